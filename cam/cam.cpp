@@ -2,16 +2,14 @@
 #include "cam/cam.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
 
-#include "cam/job/cut_report.h"
+#include "cam/job/cut_job.h"
 #include "cam/job/job_files.h"
-#include "cam/plan/cut_plan.h"
 #include "cam/plan/finishing.h"
 #include "cam/predict/prediction.h"
 #include "cam/tolerance/part_model.h"
@@ -21,93 +19,8 @@
 #include "core/text/number_text.h"
 
 namespace lensforge {
-namespace {
 
 namespace fs = std::filesystem;
-
-using Clock = std::chrono::steady_clock;
-
-std::string names_of(const std::vector<fs::path>& paths) {
-  std::string names;
-  for (const fs::path& path : paths) {
-    names += (names.empty() ? "" : ", ") + path.filename().string();
-  }
-  return names;
-}
-
-/// One run of make_cut().
-class Job {
- public:
-  Job(const Lens& lens, const CamOptions& options, fs::path folder, const Executor& executor,
-      const RunControl& control)
-      : lens_(lens),
-        options_(options),
-        folder_(std::move(folder)),
-        executor_(executor.with_stop(control.stop_token())),
-        control_(control),
-        plan_(lens, options, executor_) {}
-
-  CamResult run() {
-    const Clock::time_point start = Clock::now();
-    const ProgramPlan plan = plan_.programs(control_);
-    const ProgramSettings settings = plan_.settings();
-    require_replaceable_cut(folder_, programs_in_the_way(plan, options_.post, settings, folder_),
-                            cut_file_names(options_), options_.force);
-    PendingPrograms programs(plan, options_.post, settings, folder_, control_);
-    std::optional<Prediction> prediction;
-    if (options_.render) {
-      prediction = predict_cut(plan_, lens_, programs.programs(), executor_, control_);
-    }
-    CamResult result;
-    result.report = make_report(plan_, programs.programs(), prediction, lens_);
-    const OtherPrograms others = other_programs(folder_, paths_of(programs.programs()));
-    warn_of(others, result.report);
-    result.report.seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    PendingFiles files(folder_);
-    if (prediction) add_prediction_files(*prediction, lens_, files);
-    add_report_files(result.report, files);
-    publish(programs, others, files, result);
-    const Verdict& verdict = result.report.verdict;
-    result.message = verdict_words(verdict.missed(), verdict.advice());
-    return result;
-  }
-
- private:
-  static std::vector<fs::path> paths_of(const ProgramFiles& programs) {
-    std::vector<fs::path> paths;
-    for (const WrittenProgram& file : programs.files) paths.push_back(file.path);
-    return paths;
-  }
-
-  static void warn_of(const OtherPrograms& others, ReportData& report) {
-    if (others.kept.empty()) return;
-    report.warnings.push_back("the folder holds programs of another job, which were kept: " +
-                              names_of(others.kept) + "; do not run them with it");
-  }
-
-  /// Deletes the old report first and publishes the new one last, so that a report never describes
-  /// other programs than those beside it.
-  void publish(PendingPrograms& programs, const OtherPrograms& others, PendingFiles& files,
-               CamResult& result) const {
-    remove_prediction(folder_);
-    programs.publish();
-    for (const fs::path& path : others.earlier) {
-      std::error_code ignored;
-      fs::remove(path, ignored);
-    }
-    result.files = paths_of(programs.programs());
-    for (const fs::path& path : files.publish()) result.files.push_back(path);
-  }
-
-  const Lens& lens_;
-  const CamOptions& options_;
-  fs::path folder_;
-  Executor executor_;
-  const RunControl& control_;
-  CutPlan plan_;
-};
-
-}  // namespace
 
 void remove_cut(const fs::path& folder) {
   remove_prediction(folder);
@@ -118,12 +31,20 @@ void remove_cut(const fs::path& folder) {
 CamResult make_cut(const Lens& lens, const CamOptions& options, const fs::path& folder,
                    const Executor& executor, const RunControl& control) {
   validate(options, lens.setup);
+  const CutJob job{options, {{&lens, options, folder}}, std::nullopt, cut_file_names(options)};
   try {
-    Job job(lens, options, folder, executor, control);
-    require_writable_folder(folder);
-    return job.run();
+    WrittenJob written = write_job(job, folder, executor, control);
+    remove_prediction(folder);
+    CamResult result;
+    result.files = publish(written);
+    result.report = std::move(written.reports.front());
+    const Verdict& verdict = result.report.verdict;
+    result.message = verdict_words(verdict.missed(), verdict.advice());
+    return result;
   } catch (const Interrupted&) {
-    return {CamResult::Status::kInterrupted, "interrupted", {}, {}};
+    CamResult result;
+    result.interrupt();
+    return result;
   }
 }
 
@@ -163,10 +84,10 @@ constexpr double kSurfaces = 8.0;               ///< Number rendered.
 /// Reserve left free by the advised value.
 constexpr double kSpare = 1.5;
 
-double finish_length(const CamOptions& options, const Eigen::Vector2d& size) {
+double finish_length(const CamOptions& options, const OpticalSetup& setup) {
   const FinishProcess& finish = options.workshop.process.finish;
-  const double radius = finishing_ball(options).radius();
-  const double pitch = finish_pitch(finish, radius);
+  const Eigen::Vector2d size = size_to_cut(options, setup);
+  const double pitch = finish_pitch(options, unknown_ground(options, setup));
   const auto rows_of = [&](const Tool& ball, double apart) {
     return (size + Eigen::Vector2d::Constant(ball.diameter)).prod() / apart;
   };
@@ -209,9 +130,14 @@ double rough_points(const CamOptions& options, const Eigen::Vector2d& size) {
   return levels * points_of(shop.process.rough, size) + points_of(shop.process.semi, size);
 }
 
+Passes planned_passes(const CamOptions& options, const OpticalSetup& setup) {
+  return passes_on_lens(options, unknown_ground(options, setup));
+}
+
 double samples_of(const CamOptions& options, const OpticalSetup& setup) {
   if (!options.render) return 0.0;
-  return kSurfaces * setup.lens_size.prod() / sample_spacings(options, setup).prod();
+  const Eigen::Vector2d spacings = sample_spacings(options, setup, planned_passes(options, setup));
+  return kSurfaces * setup.lens_size.prod() / spacings.prod();
 }
 
 double memory_per_move(const FinishProcess& finish) {
@@ -229,19 +155,11 @@ double drawn_parts(const CamOptions& options) {
 }
 
 double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
-  const FinishProcess& finish = options.workshop.process.finish;
   PartPlan plan;
   plan.optics = setup;
-  plan.passes.pitch = finish_pitch(finish, finishing_ball(options).radius());
-  plan.passes.axis = finish.along == PassAxis::kX ? 0 : 1;
-  plan.passes.cross = finish.cross;
+  plan.passes = planned_passes(options, setup);
   plan.polish = options.workshop.polish;
   return options.tolerances > 0 ? static_cast<double>(part_nodes(plan)) : 0.0;
-}
-
-Eigen::Vector2d size_of(const CamOptions& options, const OpticalSetup& setup) {
-  const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
-  return setup.lens_size / (1.0 - shrinkage);
 }
 
 /// Comparisons are written so that NaN is refused too.
@@ -261,8 +179,8 @@ double rounded_up(double value) {
 }  // namespace
 
 WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, int threads) {
-  const Eigen::Vector2d size = size_of(options, setup);
-  const double length = finish_length(options, size);
+  const Eigen::Vector2d size = size_to_cut(options, setup);
+  const double length = finish_length(options, setup);
   const double moves = length * moves_per_mm(options.workshop.process.finish);
   const double points = rough_points(options, size);
   WorkEstimate estimate;
@@ -283,14 +201,14 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
 
 void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
                           const WorkEstimate& estimate, const fs::path& folder) {
-  const Eigen::Vector2d size = size_of(options, setup);
+  const Eigen::Vector2d size = size_to_cut(options, setup);
   const FinishProcess& finish = options.workshop.process.finish;
   WorkEstimate on_one_core = estimate;
   on_one_core.seconds = estimate_cut(options, setup, 1).seconds;
   const double share = std::max(
       {estimate.disk_bytes / free_disk_bytes(folder), estimate.memory_bytes / free_memory_bytes(),
        estimate.disk_bytes / kMaxCutBytes, on_one_core.seconds / kMaxCutSeconds});
-  const double moves = finish_length(options, size) * moves_per_mm(finish);
+  const double moves = finish_length(options, setup) * moves_per_mm(finish);
   const auto require = [&](const std::string& what, const std::string& advice) {
     require_room(estimate, folder, what, advice);
     require_bearable(on_one_core, what, advice);
@@ -308,11 +226,12 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
                    "fewer parts, --tolerances 200, would fit");
   }
   if (samples_of(options, setup) * kSecondsPerSample > 0.5 * on_one_core.seconds) {
-    return require("--sample-spacing " + shortest_text(sample_spacing(options)) + "mm",
+    const double spacing = sample_spacing(options, planned_passes(options, setup));
+    return require("--sample-spacing " + shortest_text(spacing) + "mm",
                    "a larger --sample-spacing would fit");
   }
   const double radius = finishing_ball(options).radius();
-  const double pitch = finish_pitch(finish, radius);
+  const double pitch = max_pitch(finish, radius, kUnknownSlope);
   const double fitting = rounded_up(pitch * share * kSpare);
   if (fineness(finish) > 1.0 && fitting > radius) {
     return require("tolerances this fine", "a larger --slope-tolerance or --tolerance would fit");

@@ -29,15 +29,23 @@ inline constexpr const char* kReport = "report.json";
 inline constexpr const char* kPage = "report.html";
 }  // namespace cam_file
 
-/// Result of a cut.
-struct CamResult {
+/// Result of a job, whether its blank holds one part or several.
+struct JobResult {
   enum class Status { kDone, kInterrupted };
   Status status = Status::kDone;
   std::string message;                       ///< Why it ended, in one line.
   std::vector<std::filesystem::path> files;  ///< Files written, programs first.
-  ReportData report;                         ///< Empty if it was interrupted.
 
   [[nodiscard]] bool done() const { return status == Status::kDone; }
+  void interrupt() {
+    status = Status::kInterrupted;
+    message = "interrupted";
+  }
+};
+
+/// Result of a cut.
+struct CamResult : JobResult {
+  ReportData report;  ///< Empty if it was interrupted.
 };
 
 /// Makes everything that an operator needs to cut a lens: programs for roughing, semi-finishing and
@@ -183,18 +191,13 @@ struct NestProgram {
 };
 
 /// Result of a nest.
-struct NestResult {
-  enum class Status { kDone, kInterrupted };
-  Status status = Status::kDone;
-  std::string message;                       ///< Why it ended, in one line.
-  std::vector<std::filesystem::path> files;  ///< Files written, programs first.
+struct NestResult : JobResult {
   NestLayout layout;
   std::vector<NestProgram> programs;  ///< In the order in which they are run.
   int tool_changes = 0;               ///< Includes the first tool.
   double z_offset = 0.0;              ///< Program Z − lens-frame z, mm.
   std::vector<std::string> warnings;  ///< Of the nest as a whole.
 
-  [[nodiscard]] bool done() const { return status == Status::kDone; }
   [[nodiscard]] bool passes() const;
   /// Number of missed limits, over all lenses.
   [[nodiscard]] int missed() const;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moves a lens's heights down the gradient of its picture's error: a loop to put terms of your own into."""
+"""Moves a lens's heights down the gradient of its picture's error: a loop to which you can add terms."""
 
 import sys
 

@@ -11,7 +11,6 @@
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "cam/cam.h"
 #include "cam/job/job_files.h"
@@ -48,15 +47,36 @@ void add_cam_options(OptionSet& options, CamSettings& settings) {
   options.fields(settings.cam);
 }
 
-void settle(OptionSet& options, CamSettings& settings) {
-  const std::string file = settings.workshop.empty() ? "workshop" : settings.workshop;
-  if (!settings.workshop.empty()) {
-    settings.cam.workshop = read_workshop(settings.workshop);
-    options.restate();
-  }
-  if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
+void take_workshop(OptionSet& options, const std::string& file, CamOptions& cam) {
+  if (file.empty()) return;
+  cam.workshop = read_workshop(file);
+  options.restate();
+}
+
+void check_workshop(const std::string& file, const CamOptions& cam) {
   // The file's own values were already checked: any error now comes from an option.
-  validate(settings.cam.workshop, file + " with the options given");
+  validate(cam.workshop, (file.empty() ? "workshop" : file) + " with the options given");
+}
+
+void settle(OptionSet& options, CamSettings& settings) {
+  take_workshop(options, settings.workshop, settings.cam);
+  if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
+  check_workshop(settings.workshop, settings.cam);
+}
+
+nlohmann::json job_json(const OptionSet& options, const JobResult& result,
+                        const std::vector<std::string>& warnings) {
+  nlohmann::json json = {{"status", result.done() ? "done" : "interrupted"},
+                         {"message", result.message},
+                         {"warnings", warnings},
+                         {"options", options.used()},
+                         {"files", nlohmann::json::array()}};
+  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+  return json;
+}
+
+std::string z_text(double z_offset) {
+  return "  Z         program Z = lens z + " + fixed(z_offset, 4) + " mm\n";
 }
 
 namespace {
@@ -103,39 +123,23 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
     if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }
-  return text + verdict_text(report.verdict) + "  Z         program Z = lens z + " +
-         fixed(report.z_offset, 4) + " mm\n";
+  return text + verdict_text(report.verdict) + z_text(report.z_offset);
 }
 
-nlohmann::json summary_json(const OptionSet& options, const CamResult& result) {
-  nlohmann::json json = {
-      {"command", "cam"},          {"status", result.done() ? "done" : "interrupted"},
-      {"message", result.message}, {"warnings", result.report.warnings},
-      {"options", options.used()}, {"files", nlohmann::json::array()}};
-  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+CommandResult cut(CommandFrame& frame, const CamSettings& settings, const Lens& lens) {
+  const CamOptions& cam = settings.cam;
+  const OptionSet& options = frame.options();
+  const WorkEstimate estimate = estimate_cut(cam, lens.setup, options.executor().concurrency());
+  require_room_for_cut(cam, lens.setup, estimate, settings.folder());
+  frame.begin_folder(settings.folder()).remove_partial_files(is_name_of_cut);
+  announce_work(estimate, frame.console(), "the cut takes");
+  if (const std::string few = decimals_warning(cam); !few.empty()) frame.console().note(few);
+  const CamResult result =
+      make_cut(lens, cam, settings.folder(), frame.executor(), frame.control());
+  nlohmann::json json = job_json(options, result, result.report.warnings);
   if (result.done()) json["report"] = report_json(result.report);
-  return json;
-}
-
-CamResult run(const OptionSet& options, const CamOptions& cam, const Lens& lens,
-              const fs::path& out, const Console& console) {
-  const Executor executor = options.executor();
-  const WorkEstimate estimate = estimate_cut(cam, lens.setup, executor.concurrency());
-  require_room_for_cut(cam, lens.setup, estimate, out);
-  const InterruptWatch interrupt;
-  const OutputFolder folder(out, FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_cut);
-  announce_work(estimate, console, "the cut takes");
-  const std::string few = decimals_warning(cam);
-  if (!few.empty()) console.note(few);
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
-  return make_cut(lens, cam, out, executor, control);
-}
-
-int exit_code(const CamResult& result) {
-  if (!result.done()) return kInterrupted;
-  return result.report.verdict.missed() == 0 ? kDone : kLimitMissed;
+  return {json, result.done() ? summary_text(settings.folder(), result) : result.message + "\n",
+          exit_code(result.done(), result.report.verdict.missed() == 0), result.report.warnings};
 }
 
 std::string choice_text(const ReportChoice& choice) {
@@ -144,21 +148,16 @@ std::string choice_text(const ReportChoice& choice) {
          fixed(choice.hours, 2) + " h\n";
 }
 
-int compare(const OptionSet& options, const CamSettings& settings, const CamOptions& cam,
-            const Lens& lens, const Console& console) {
+CommandResult compare(CommandFrame& frame, const CamSettings& settings, const Lens& lens) {
   const CutChoices choices = parse_choices(settings.compare, "--compare");
-  const Executor executor = options.executor();
-  const WorkEstimate estimate =
-      require_room_for_comparison(lens, cam, choices, settings.folder(), executor.concurrency());
-  const InterruptWatch interrupt;
-  const OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_cut);
-  announce_work(estimate, console, "the comparison takes");
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
-  const CutComparison result = compare_cuts(lens, cam, choices, folder.path(), executor, control);
-  nlohmann::json json = {{"command", "cam"},
-                         {"status", result.complete ? "done" : "interrupted"},
+  const OptionSet& options = frame.options();
+  const WorkEstimate estimate = require_room_for_comparison(
+      lens, settings.cam, choices, settings.folder(), options.executor().concurrency());
+  frame.begin_folder(settings.folder()).remove_partial_files(is_name_of_cut);
+  announce_work(estimate, frame.console(), "the comparison takes");
+  const CutComparison result = compare_cuts(lens, settings.cam, choices, settings.folder(),
+                                            frame.executor(), frame.control());
+  nlohmann::json json = {{"status", result.complete ? "done" : "interrupted"},
                          {"options", options.used()},
                          {"choices", nlohmann::json::array()},
                          {"files", nlohmann::json::array()}};
@@ -172,30 +171,20 @@ int compare(const OptionSet& options, const CamSettings& settings, const CamOpti
     text += result.advice + "\n";
   }
   if (result.complete) json["files"].push_back(result.page.string());
-  console.result(json, text);
-  return result.complete ? kDone : kInterrupted;
+  return {json, text, exit_code(result.complete)};
 }
 
 nlohmann::json workshop_json(const Workshop& workshop) {
   std::ostringstream text;
   text << toml::json_formatter{parse_toml(workshop_toml(workshop), "workshop")};
-  return {{"command", "cam"}, {"workshop", nlohmann::json::parse(text.str())}};
+  return {{"workshop", nlohmann::json::parse(text.str())}};
 }
 
-}  // namespace
-
-int cam_command(const Arguments& command_line) {
-  CamSettings settings;
-  OptionSet options("cam",
-                    "Makes the programs that mill a lens and predicts what it will project.");
-  add_cam_options(options, settings);
-  options.parse(command_line);
-  const Console console(options.common().json, options.common().quiet);
+CommandResult run(CommandFrame& frame, CamSettings& settings) {
   const CamOptions& cam = settings.cam;
   if (settings.show_workshop) {
-    settle(options, settings);
-    console.result(workshop_json(cam.workshop), workshop_toml(cam.workshop));
-    return kDone;
+    settle(frame.options(), settings);
+    return {workshop_json(cam.workshop), workshop_toml(cam.workshop)};
   }
   if (settings.source.empty()) {
     throw InputError("DIR: is missing; name the lens folder, as in lensforge cam portrait");
@@ -205,15 +194,19 @@ int cam_command(const Arguments& command_line) {
     reading.emplace(settings.source, FolderLock::Kind::kShared);
   }
   const Lens lens = read_lens(settings.source);
-  settle(options, settings);
+  settle(frame.options(), settings);
   validate(cam, lens.setup);
-  note_unfinished_design(lens, console);
-  if (!settings.compare.empty()) return compare(options, settings, cam, lens, console);
-  const CamResult result = run(options, cam, lens, settings.folder(), console);
-  for (const std::string& warning : result.report.warnings) console.note("warning: " + warning);
-  console.result(summary_json(options, result),
-                 result.done() ? summary_text(settings.folder(), result) : result.message + "\n");
-  return exit_code(result);
+  note_unfinished_design(lens, frame.console());
+  return settings.compare.empty() ? cut(frame, settings, lens) : compare(frame, settings, lens);
+}
+
+}  // namespace
+
+int cam_command(const Arguments& arguments) {
+  return run_command<CamSettings>(
+      {"cam", "Makes the programs that mill a lens and predicts what it will project.",
+       add_cam_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

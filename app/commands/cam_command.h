@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "app/frame/option_set.h"
+#include "cam/cam.h"
 #include "cam/plan/cam_options.h"
 #include "cam/report/verdict.h"
 
@@ -34,6 +36,21 @@ void add_cam_options(OptionSet& options, CamSettings& settings);
 /// Overrides the workshop file with the given options. @throw InputError naming file or option,
 /// value and rule.
 void settle(OptionSet& options, CamSettings& settings);
+
+/// Reads a workshop file, if one is named, and overrides it with the options given.
+/// @throw InputError naming the file, key, value and rule.
+void take_workshop(OptionSet& options, const std::string& file, CamOptions& cam);
+
+/// Checks the workshop after its options were given. @throw InputError naming file or option,
+/// value and rule.
+void check_workshop(const std::string& file, const CamOptions& cam);
+
+/// What both commands print of a job as JSON: status, message, warnings, options, files.
+nlohmann::json job_json(const OptionSet& options, const JobResult& result,
+                        const std::vector<std::string>& warnings);
+
+/// The programs' zero along Z in the lens frame, as a line.
+std::string z_text(double z_offset);
 
 /// Returns one line for every limit that a cut misses and for every piece of advice.
 std::string verdict_text(const Verdict& verdict);

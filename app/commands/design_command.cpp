@@ -32,7 +32,6 @@
 #include "cam/plan/cam_options.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
-#include "core/compute/run_control.h"
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
@@ -64,10 +63,12 @@ Description part_options(CamOptions& cut) {
   return description_of(cut).only({"--part", "--shrinkage"});
 }
 
+/// The slopes that a scallop's pitch depends on are not known before the design; cam warns if they
+/// make it another.
 MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
   const FinishProcess& finish = shop.process.finish;
   const CamOptions& cut = settings.cut;
-  const MadeBy made{finish_pitch(finish, shop.tool(finish.tool).radius()),
+  const MadeBy made{max_pitch(finish, shop.tool(finish.tool).radius(), kUnknownSlope),
                     finish.along == PassAxis::kX,
                     shop.polish.sigma,
                     shop.polish.rim_depth,

@@ -14,7 +14,6 @@
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "cam/cam.h"
 #include "cam/plan/cam_options.h"
@@ -73,17 +72,13 @@ void add_nest_options(OptionSet& options, NestSettings& settings) {
 }
 
 void settle(OptionSet& options, NestSettings& settings) {
-  const std::string file = settings.workshop.empty() ? "workshop" : settings.workshop;
-  if (!settings.workshop.empty()) {
-    settings.nest.cam.workshop = read_workshop(settings.workshop);
-    options.restate();
-  }
+  take_workshop(options, settings.workshop, settings.nest.cam);
   if (settings.sources.empty()) {
     throw InputError("DIR: is required; name the lens folders, such as nest bee disc");
   }
   if (!options.given(kBlank)) throw InputError("--blank: is required; such as --blank 300,200");
   settings.nest.cam.job = folder_name(settings.out);
-  validate(settings.nest.cam.workshop, file + " with the options given");
+  check_workshop(settings.workshop, settings.nest.cam);
 }
 
 std::vector<std::string> nest_names(const std::vector<std::string>& sources) {
@@ -165,17 +160,12 @@ std::string summary_text(const fs::path& folder, const NestResult& result) {
             fixed(program.minutes, 1) + " min\n";
   }
   return text + "  in all    " + fixed(result.minutes(), 1) + " min, " +
-         std::to_string(result.tool_changes) + " tools put in\n" +
-         "  Z         program Z = lens z + " + fixed(result.z_offset, 4) + " mm\n";
+         std::to_string(result.tool_changes) + " tools put in\n" + z_text(result.z_offset);
 }
 
 nlohmann::json summary_json(const OptionSet& options, const NestResult& result,
                             const Sources& sources) {
-  nlohmann::json json = {
-      {"command", "nest"},         {"status", result.done() ? "done" : "interrupted"},
-      {"message", result.message}, {"warnings", result.warnings},
-      {"options", options.used()}, {"files", nlohmann::json::array()}};
-  for (const fs::path& file : result.files) json["files"].push_back(file.string());
+  nlohmann::json json = job_json(options, result, result.warnings);
   if (!result.done()) return json;
   json.update(nest_json(result, true));
   for (std::size_t k = 0; k < json["lenses"].size(); ++k) {
@@ -184,30 +174,9 @@ nlohmann::json summary_json(const OptionSet& options, const NestResult& result,
   return json;
 }
 
-NestResult run(const OptionSet& options, const NestSettings& settings,
-               const std::vector<NestLens>& lenses, const Console& console) {
-  const Executor executor = options.executor();
-  const NestPlan plan = plan_nest(lenses, settings.nest);
-  const WorkEstimate estimate = estimate_nest(plan, lenses, executor.concurrency());
-  require_room_for_cut(plan.cuts.front(), lenses.front().lens->setup, estimate, settings.out);
-  const InterruptWatch interrupt;
-  const OutputFolder folder(settings.out, FolderLock::Kind::kExclusive);
-  folder.remove_partial_files(is_name_of_nest);
-  announce_work(estimate, console, "the cuts take");
-  ProgressDisplay progress(options.common().quiet);
-  const RunControl control(interrupt.token(), progress.sink());
-  return make_nest(lenses, settings.nest, folder.path(), executor, control);
-}
-
-int exit_code(const NestResult& result) {
-  if (!result.done()) return kInterrupted;
-  return result.missed() == 0 ? kDone : kLimitMissed;
-}
-
-/// Prints warnings that are in every lens's report, such as collisions on the common blank, only
-/// once.
-void note_warnings(const NestResult& result, const Console& console) {
-  for (const std::string& warning : result.warnings) console.note("warning: " + warning);
+/// Warnings that are in every lens's report, such as collisions on the common blank, only once.
+std::vector<std::string> warnings_of(const NestResult& result) {
+  std::vector<std::string> warnings = result.warnings;
   const std::vector<NestedLens>& lenses = result.layout.lenses;
   for (const NestedLens& lens : lenses) {
     for (const std::string& warning : lens.report.warnings) {
@@ -215,30 +184,39 @@ void note_warnings(const NestResult& result, const Console& console) {
         const std::vector<std::string>& all = other.report.warnings;
         return std::find(all.begin(), all.end(), warning) != all.end();
       });
-      if (!common) console.note("warning: " + lens.name + ": " + warning);
-      if (common && &lens == &lenses.front()) console.note("warning: " + warning);
+      if (!common) warnings.push_back(lens.name + ": " + warning);
+      if (common && &lens == &lenses.front()) warnings.push_back(warning);
     }
   }
+  return warnings;
+}
+
+CommandResult run(CommandFrame& frame, NestSettings& settings) {
+  OptionSet& options = frame.options();
+  settle(options, settings);
+  const Sources sources(settings);
+  const std::vector<NestLens> lenses = sources.lenses();
+  sources.note_unfinished(frame.console());
+  const NestPlan plan = plan_nest(lenses, settings.nest);
+  const WorkEstimate estimate = estimate_nest(plan, lenses, options.executor().concurrency());
+  require_room_for_cut(plan.cuts.front(), lenses.front().lens->setup, estimate, settings.out);
+  frame.begin_folder(settings.out).remove_partial_files(is_name_of_nest);
+  announce_work(estimate, frame.console(), "the cuts take");
+  const NestResult result =
+      make_nest(lenses, settings.nest, settings.out, frame.executor(), frame.control());
+  return {summary_json(options, result, sources), summary_text(settings.out, result),
+          exit_code(result.done(), result.missed() == 0), warnings_of(result)};
 }
 
 }  // namespace
 
-int nest_command(const Arguments& command_line) {
-  NestSettings settings;
-  OptionSet options("nest",
-                    "Makes programs that mill several lenses of one blank with one zero, and "
-                    "predicts what each will project.");
-  add_nest_options(options, settings);
-  options.parse(command_line);
-  settle(options, settings);
-  const Console console(options.common().json, options.common().quiet);
-  const Sources sources(settings);
-  const std::vector<NestLens> lenses = sources.lenses();
-  sources.note_unfinished(console);
-  const NestResult result = run(options, settings, lenses, console);
-  note_warnings(result, console);
-  console.result(summary_json(options, result, sources), summary_text(settings.out, result));
-  return exit_code(result);
+int nest_command(const Arguments& arguments) {
+  return run_command<NestSettings>(
+      {"nest",
+       "Makes programs that mill several lenses of one blank with one zero, and predicts what each "
+       "will project.",
+       add_nest_options, run},
+      arguments);
 }
 
 }  // namespace lensforge::app

@@ -20,7 +20,7 @@
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
 

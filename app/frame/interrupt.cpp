@@ -12,7 +12,7 @@
 
 #include "app/frame/command_line.h"
 #include "app/frame/terminal_keys.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 
 // The handler only wakes a thread; nothing else must be async-signal-safe. Blocking the signals and
 // waiting for them does not work: linked libraries such as OpenBLAS start threads before main()

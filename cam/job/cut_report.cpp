@@ -21,17 +21,19 @@ namespace lensforge {
 namespace {
 
 /// Depth of tools below the blank's underside, mm.
-double depth_in_table(const CutPlan& plan) {
+double depth_in_table(const WrittenCut& cut) {
   double deepest = 0.0;
-  for (const Collision& collision : plan.collisions()) {
+  for (const Collision& collision : cut.checks.collisions()) {
     if (collision.obstacle == kTableObstacle) deepest = std::max(deepest, collision.worst.value);
   }
   return deepest;
 }
 
-double steep_moves(const CutPlan& plan) {
+double steep_moves(const WrittenCut& cut) {
   double moves = 0.0;
-  for (const SteepDescent& descent : plan.descents()) moves += static_cast<double>(descent.moves);
+  for (const SteepDescent& descent : cut.checks.descents()) {
+    moves += static_cast<double>(descent.moves);
+  }
   return moves;
 }
 
@@ -43,12 +45,12 @@ bool is_short_outline_tool(const Collision& collision, int tool) {
 }
 
 /// For a single cut: a nest's blank has a thickness of its own.
-std::string outline_warning(const CutPlan& plan, const Lens& lens) {
-  if (plan.place().shared() || !cuts_outline(plan.options(), lens.setup)) return "";
+std::string outline_warning(const WrittenCut& cut) {
+  if (cut.shared || !cut.setup.cuts_outline()) return "";
   const double usual = Stock{}.allowance;
   return outline_tool_advice(
-      plan, plan.blank().max().z(),
-      {"--stock " + trimmed_decimal(usual, 3), plan.part_box().max().z() + usual});
+      cut.setup, cut.checks, cut.setup.blank.max().z(),
+      {"--stock " + trimmed_decimal(usual, 3), cut.setup.field.box.max().z() + usual});
 }
 
 /// Depth of a tool in a slot of its own width before a part that does not cut gets into it or
@@ -59,45 +61,50 @@ double free_length(const Tool& tool) {
   return length;
 }
 
-}  // namespace
-
-std::vector<LimitCheck> safety_checks(const CutPlan& plan) {
+/// Checks of what the machine must not do: collisions, descents too steep for their feed, motion
+/// below the blank or beyond the travel.
+std::vector<LimitCheck> safety_checks(const WrittenCut& cut) {
   const auto collisions =
-      static_cast<double>(plan.collisions().size() + plan.watch().faults().size());
+      static_cast<double>(cut.checks.collisions().size() + cut.checks.watch().faults().size());
   std::vector<LimitCheck> checks{
       {"collisions", "collisions", collisions, 0.0, "", 0},
-      {"table", "cut below the blank", depth_in_table(plan), 0.0, "mm", 4}};
-  const Eigen::Vector3d extent = plan.watch().extent();
-  const Eigen::Vector3d& travel = plan.options().workshop.machine.travel;
+      {"table", "cut below the blank", depth_in_table(cut), 0.0, "mm", 4}};
+  const Eigen::Vector3d extent = cut.checks.watch().extent();
+  const Eigen::Vector3d& travel = cut.setup.options.workshop.machine.travel;
   for (int axis = 0; axis < 3; ++axis) {
     checks.push_back({std::string("travel_") + "xyz"[axis],
                       std::string("machine travel along ") + "XYZ"[axis], extent[axis],
                       travel[axis], "mm", 2});
   }
   checks.push_back({"descents", "moves down into material too steep for their feed",
-                    steep_moves(plan), 0.0, "", 0});
+                    steep_moves(cut), 0.0, "", 0});
   return checks;
 }
 
-std::vector<std::string> safety_warnings(const CutPlan& plan, const ProgramFiles& programs,
-                                         const Lens& lens) {
+/// The same in sentences; empty if nothing was found.
+std::vector<std::string> safety_warnings(const WrittenCut& cut) {
   std::vector<std::string> warnings;
-  for (const Collision& collision : plan.collisions()) warnings.push_back(collision.sentence());
-  for (const SteepDescent& descent : plan.descents()) {
-    warnings.push_back(descent.sentence(programs.names[descent.first.program]));
+  for (const Collision& collision : cut.checks.collisions()) {
+    warnings.push_back(collision.sentence());
   }
-  for (const std::string& fault : plan.watch().faults()) warnings.push_back(fault);
+  for (const SteepDescent& descent : cut.checks.descents()) {
+    warnings.push_back(descent.sentence(cut.programs.names[descent.first.program]));
+  }
+  for (const std::string& fault : cut.checks.watch().faults()) warnings.push_back(fault);
   for (const std::string& sentence :
-       {outline_warning(plan, lens),
-        travel_fault(plan.watch().extent(), plan.options().workshop.machine.travel)}) {
+       {outline_warning(cut),
+        travel_fault(cut.checks.watch().extent(), cut.setup.options.workshop.machine.travel)}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
   return warnings;
 }
 
-std::string outline_tool_advice(const CutPlan& plan, double thickness, const ThinBlank& thin) {
-  const Tool tool = plan.outline_cut().tool;
-  const std::vector<Collision>& collisions = plan.collisions();
+}  // namespace
+
+std::string outline_tool_advice(const CutSetup& setup, const ProgramChecks& checks,
+                                double thickness, const ThinBlank& thin) {
+  const Tool tool = setup.outline_cut().tool;
+  const std::vector<Collision>& collisions = checks.collisions();
   if (std::none_of(collisions.begin(), collisions.end(), [&](const Collision& collision) {
         return is_short_outline_tool(collision, tool.number);
       })) {
@@ -107,7 +114,7 @@ std::string outline_tool_advice(const CutPlan& plan, double thickness, const Thi
       joined({"--outline-tool ", std::to_string(tool.number), ": goes ",
               trimmed_decimal(free_length(tool), 3), " mm deep at most, too short for a blank of ",
               trimmed_decimal(thickness, 3), " mm; "});
-  const std::vector<Tool>& tools = plan.options().workshop.tools;
+  const std::vector<Tool>& tools = setup.options.workshop.tools;
   const auto other = std::find_if(tools.begin(), tools.end(), [&](const Tool& one) {
     return one.shape == CutterShape::kFlat && one.diameter <= tool.diameter &&
            free_length(one) >= thickness;
@@ -127,6 +134,10 @@ namespace {
 
 constexpr double kMicrometres = 1e3;
 constexpr double kSecondsPerMinute = 60.0;
+
+/// Share by which a pitch may differ from the one that a lens was designed for: the variance of
+/// what rows average, p²/12, then changes by 2 %.
+constexpr double kSamePitch = 0.01;
 
 /// Of a material's refractive index: makers state acrylic as 1.49 to 1.492, and an error of 0.005
 /// changes the refraction by 1 %.
@@ -151,36 +162,37 @@ std::string up_words(PartKind part, const Lens& lens) {
 }
 
 /// Place of a front in program coordinates.
-std::string place_words(const CutPlan& plan, const SphericalFront& front) {
+std::string place_words(const CutSetup& setup, const SphericalFront& front) {
   return std::string(front.radius > 0.0 ? "bulging" : "hollow") + " sphere of radius " +
          mm(std::abs(front.radius), 2) + ", there before the first cut: its apex lies at X " +
          decimal_text(front.apex.x(), 3) + " Y " + decimal_text(front.apex.y(), 3) + " Z " +
-         decimal_text(front.apex.z() + plan.z_offset(), 3) + " of the program, " +
-         mm(plan.blank().max().z() - front.apex.z(), 3) + " below the top of the blank";
+         decimal_text(front.apex.z() + setup.z_offset, 3) + " of the program, " +
+         mm(setup.blank.max().z() - front.apex.z(), 3) + " below the top of the blank";
 }
-std::string place_words(const CutPlan& plan, const HeightFront& front) {
+std::string place_words(const CutSetup& setup, const HeightFront& front) {
   return joined({"height map, there before the first cut: the corner of ", lens_file::kFront,
                  " at its lower left lies at X 0.000 Y 0.000, that at its upper right at X ",
                  decimal_text(front.size.x(), 3), " Y ", decimal_text(front.size.y(), 3),
-                 ", its height 0 at Z ", decimal_text(plan.z_offset(), 3), " of the program, ",
-                 mm(plan.blank().max().z(), 3), " below the top of the blank; beyond the lens it ",
+                 ", its height 0 at Z ", decimal_text(setup.z_offset, 3), " of the program, ",
+                 mm(setup.blank.max().z(), 3), " below the top of the blank; beyond the lens it ",
                  "goes on straight"});
 }
 
 /// Required place of the blank's front, and the effect of an error.
-std::string front_words(const CutPlan& plan, const Lens& lens) {
+std::string front_words(const CutSetup& setup) {
+  const Lens& lens = *setup.lens;
   const Eigen::Vector2d middle = 0.5 * lens.setup.lens_size;
   const double top = lens.surface.vertices.row(2).mean();
   const double shift = shift_by_front(lens.setup, {middle.x(), middle.y(), top});
-  return std::visit([&plan](const auto& front) { return place_words(plan, front); },
+  return std::visit([&setup](const auto& front) { return place_words(setup, front); },
                     lens.setup.front.value()) +
          "; 0.1 mm aside moves the picture by " + mm(0.1 * shift, 3) +
-         ". The nest may reach up to Z " + decimal_text(plan.z_offset(), 3) + ", no higher";
+         ". The nest may reach up to Z " + decimal_text(setup.z_offset, 3) + ", no higher";
 }
 
 /// The blank including the part of its front below z = 0.
-Eigen::AlignedBox3d whole_box(const CutPlan& plan, const Front& front) {
-  Eigen::AlignedBox3d blank = plan.blank();
+Eigen::AlignedBox3d whole_box(const CutSetup& setup, const Front& front) {
+  Eigen::AlignedBox3d blank = setup.blank;
   blank.min().z() =
       std::min(blank.min().z(), lowest_of(front, {Eigen::Vector2d(blank.min().head<2>()),
                                                   Eigen::Vector2d(blank.max().head<2>())}));
@@ -195,26 +207,28 @@ std::string length_words_of(const PostDescription& post, const ProgramFiles& pro
   return length_words(post, most, "the tool of each program");
 }
 
-SetupSheet setup_sheet(const CutPlan& plan, const ProgramFiles& programs, const Lens& designed) {
-  const CamOptions& options = plan.options();
+SetupSheet setup_sheet(const WrittenCut& cut) {
+  const CutSetup& setup = cut.setup;
+  const CamOptions& options = setup.options;
+  const Lens& designed = *setup.lens;
   const bool lens = options.part == PartKind::kLens;
   SetupSheet sheet;
   sheet.machine = options.workshop.machine.name;
   sheet.material = lens ? options.workshop.material.name : "mould material";
-  sheet.part = plan.part_box();
+  sheet.part = setup.field.box;
   if (lens) sheet.part.min().z() = 0.0;  // The surface's box ends at its lowest point.
-  sheet.blank = plan.blank();
-  const Eigen::Vector2d& corner = plan.place().corner;
-  sheet.zero = {-corner.x(), -corner.y(), -plan.z_offset()};
+  sheet.blank = setup.blank;
+  const Eigen::Vector2d& corner = cut.corner;
+  sheet.zero = {-corner.x(), -corner.y(), -setup.z_offset};
   const char* const part = is_mirror(designed) ? "mirror" : "lens";
-  sheet.zero_words = joined({"lower left corner of the ", plan.place().shared() ? "blank" : part,
-                             ", ", words_for(options.z_zero)});
+  sheet.zero_words = joined(
+      {"lower left corner of the ", cut.shared ? "blank" : part, ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
-  sheet.length_words = length_words_of(options.post, programs);
+  sheet.length_words = length_words_of(options.post, cut.programs);
   if (lens && designed.setup.front) {
     sheet.front = designed.setup.front;
-    sheet.front_words = front_words(plan, designed);
-    sheet.blank = whole_box(plan, *designed.setup.front);
+    sheet.front_words = front_words(setup);
+    sheet.blank = whole_box(setup, *designed.setup.front);
   }
   for (const KeepOut& clamp : options.workshop.keep_outs) {
     sheet.keep_outs.push_back({clamp.name, {clamp.low, clamp.high}});
@@ -234,10 +248,11 @@ std::string files_of(const ProgramFiles& programs, std::size_t operation) {
   return names;
 }
 
-std::vector<ReportOperation> report_operations(const CutPlan& plan, const ProgramFiles& programs) {
+std::vector<ReportOperation> report_operations(const WrittenCut& cut) {
+  const ProgramFiles& programs = cut.programs;
   std::vector<ReportOperation> operations;
   for (std::size_t i = 0; i < programs.summaries.size(); ++i) {
-    const Tool& tool = plan.options().workshop.tool(programs.summaries[i].tool);
+    const Tool& tool = cut.setup.options.workshop.tool(programs.summaries[i].tool);
     const ProgramTime& time = programs.times[i];
     operations.push_back({programs.summaries[i], files_of(programs, i), tool.feed, tool.spindle_rpm,
                           time.seconds / kSecondsPerMinute, time.lines,
@@ -246,31 +261,32 @@ std::vector<ReportOperation> report_operations(const CutPlan& plan, const Progra
   return operations;
 }
 
-std::vector<Tool> tools_of(const CutPlan& plan, const ProgramFiles& programs) {
+std::vector<Tool> tools_of(const WrittenCut& cut) {
   std::vector<Tool> tools;
-  for (const OperationSummary& summary : programs.summaries) {
+  for (const OperationSummary& summary : cut.programs.summaries) {
     const bool known = std::any_of(tools.begin(), tools.end(),
                                    [&](const Tool& tool) { return tool.number == summary.tool; });
-    if (!known) tools.push_back(plan.options().workshop.tool(summary.tool));
+    if (!known) tools.push_back(cut.setup.options.workshop.tool(summary.tool));
   }
   return tools;
 }
 
-ParameterGroup finish_parameters(const CutPlan& plan, SurfaceModel model) {
-  const FinishProcess& finish = plan.options().workshop.process.finish;
+ParameterGroup finish_parameters(const WrittenCut& cut) {
+  const CutSetup& setup = cut.setup;
+  const FinishProcess& finish = setup.options.workshop.process.finish;
   ParameterGroup group{
       "Finishing",
-      {{"Stepover", mm(plan.pitch(), 4)},
+      {{"Stepover", mm(setup.pitch(), 4)},
        {"Rows along", finish.along == PassAxis::kX ? "X" : "Y"},
        {"Tolerance", mm(finish.tolerance, 5)},
-       {"Slope tolerance", decimal_text(1e3 * aimed_slope(plan.options()), 2) + " mrad"},
-       {"Decimals", std::to_string(plan.decimals())},
-       {"Surface", words_for(model)}}};
-  if (const RestMap* const rest = plan.balls().rest()) {
-    const Tool& large = *larger_ball(plan.options());
+       {"Slope tolerance", decimal_text(1e3 * aimed_slope(setup.options), 2) + " mrad"},
+       {"Decimals", std::to_string(decimals_of(setup.options))},
+       {"Surface", words_for(setup.model)}}};
+  if (const RestMap* const rest = cut.passes.balls->rest()) {
+    const Tool& large = *larger_ball(setup.options);
     group.parameters.push_back(
         {"Larger ball", mm(large.diameter, 2) + ", stepover " +
-                            mm(finish.large_every * plan.pitch(), 4) + ", leaves " +
+                            mm(finish.large_every * setup.pitch(), 4) + ", leaves " +
                             percent_text(rest->share_within(BallBlend::kWidth)) +
                             " of the lens to the smaller one, overlap included"});
   }
@@ -299,8 +315,8 @@ ParameterGroup entry_parameters(const Process& process) {
 }
 
 /// Parameters of the outline cut.
-ParameterGroup outline_parameters(const CutPlan& plan) {
-  const OutlineCut cut = plan.outline_cut();
+ParameterGroup outline_parameters(const CutSetup& setup) {
+  const OutlineCut cut = setup.outline_cut();
   return {
       "Outline",
       {{"Tool", "T" + std::to_string(cut.tool.number) + ", " + cut.tool.name},
@@ -310,17 +326,19 @@ ParameterGroup outline_parameters(const CutPlan& plan) {
                           mm(cut.tabs.height, 2) + " high, to be snapped by hand"}}};
 }
 
-std::string sampling_words(const CamOptions& options, const OpticalSetup& setup) {
-  const Eigen::Vector2d spacings = sample_spacings(options, setup);
+std::string sampling_words(const CutSetup& setup) {
+  const Eigen::Vector2d spacings =
+      sample_spacings(setup.options, setup.lens->setup, setup.passes());
   if (spacings.x() == spacings.y()) return mm(spacings.x(), 4);
   return mm(spacings.minCoeff(), 4) + " across the passes, " + mm(spacings.maxCoeff(), 4) +
          " along";
 }
 
-ParameterGroup polish_parameters(const CamOptions& options, const OpticalSetup& setup) {
+ParameterGroup polish_parameters(const CutSetup& setup) {
+  const CamOptions& options = setup.options;
   ParameterGroup group{"Polishing, as assumed",
                        {{"Gaussian σ", mm(options.workshop.polish.sigma, 3)},
-                        {"Sampled every", sampling_words(options, setup)}}};
+                        {"Sampled every", sampling_words(setup)}}};
   if (options.workshop.polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +
@@ -384,20 +402,21 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
 
 /// Difference of the index of the workshop's material from the design's; 0 where it states none,
 /// and for a mould or a mirror, through whose material no light passes.
-double index_error(const CutPlan& plan, const Lens& lens) {
-  const double stated = plan.options().workshop.material.ior;
-  if (!(stated > 0.0) || plan.options().part == PartKind::kMould || is_mirror(lens)) return 0.0;
-  return std::abs(stated - lens.setup.ior);
+double index_error(const CutSetup& setup) {
+  const double stated = setup.options.workshop.material.ior;
+  const bool transmits = setup.options.part == PartKind::kLens && !is_mirror(*setup.lens);
+  if (!(stated > 0.0) || !transmits) return 0.0;
+  return std::abs(stated - setup.lens->setup.ior);
 }
 
 /// Explains why tools touch the blank without roughing; empty if the first one's flutes are long
 /// enough. Roughing by other programs is unknown: the blank counts as whole.
-std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs) {
-  const Workshop& workshop = plan.options().workshop;
-  if (workshop.process.rough.enabled || programs.summaries.empty()) return "";
-  const OperationSummary& first = programs.summaries.front();
+std::string unroughed_warning(const WrittenCut& cut) {
+  const Workshop& workshop = cut.setup.options.workshop;
+  if (workshop.process.rough.enabled || cut.programs.summaries.empty()) return "";
+  const OperationSummary& first = cut.programs.summaries.front();
   const Tool& tool = workshop.tool(first.tool);
-  const double depth = plan.blank().max().z() - first.tip.min().z();
+  const double depth = cut.setup.blank.max().z() - first.tip.min().z();
   if (depth <= tool.flute_length) return "";
   return joined({"nothing is roughed: '", first.name, "' cuts ", decimal_text(depth, 1),
                  " mm deep into the whole blank, tool ", std::to_string(tool.number), " has ",
@@ -406,117 +425,122 @@ std::string unroughed_warning(const CutPlan& plan, const ProgramFiles& programs)
 }
 
 /// Explains why the part's picture would differ from the designed one; empty if it does not.
-std::string index_warning(const CutPlan& plan, const Lens& lens) {
-  const double stated = plan.options().workshop.material.ior;
-  if (!(index_error(plan, lens) > kIndexTolerance)) return "";
+std::string index_warning(const CutSetup& setup) {
+  const double stated = setup.options.workshop.material.ior;
+  if (!(index_error(setup) > kIndexTolerance)) return "";
   return joined({"the workshop's material has index ", trimmed_decimal(stated, 4),
-                 ", the lens was designed for ", trimmed_decimal(lens.setup.ior, 4),
+                 ", the lens was designed for ", trimmed_decimal(setup.lens->setup.ior, 4),
                  ": it would project another picture"});
 }
 
 /// Intended process of the lens if it differs from the actual one; else, or if unknown, empty.
-std::string process_warning(const CutPlan& plan, const Lens& lens) {
-  const nlohmann::json& provenance = lens.provenance.json();
+std::string process_warning(const CutSetup& setup) {
+  const nlohmann::json& provenance = setup.lens->provenance.json();
   if (!provenance.is_object() || !provenance.contains("made_by")) return "";
   const nlohmann::json& meant = provenance["made_by"];
-  const Workshop& shop = plan.options().workshop;
+  const Workshop& shop = setup.options.workshop;
   const auto number = [&](const char* key, double otherwise) {
     const bool known = meant.is_object() && meant.contains(key) && meant[key].is_number();
     return known ? meant[key].get<double>() : otherwise;
   };
   const FinishProcess& finish = shop.process.finish;
   // A cast is smaller than its mould, and is polished after casting.
-  const double scale =
-      plan.options().part == PartKind::kMould ? 1.0 - plan.options().shrinkage : 1.0;
-  const double pitch = scale * finish_pitch(finish, shop.tool(finish.tool).radius());
+  const double scale = setup.options.part == PartKind::kMould ? 1.0 - setup.options.shrinkage : 1.0;
+  const double radius = finishing_ball(setup.options).radius();
+  const double pitch = scale * max_pitch(finish, radius, setup.field.steepest);
   const double sigma = shop.polish.sigma;
   const double meant_pitch = number("pitch_mm", pitch);
   const double meant_sigma = number("polish_sigma_mm", sigma);
-  if (meant_pitch == pitch && meant_sigma == sigma) return "";
+  const bool other_pitch = std::abs(meant_pitch - pitch) > kSamePitch * meant_pitch;
+  if (!other_pitch && meant_sigma == sigma) return "";
+  // A design for a scallop does not know its slopes: designed again, it would assume the same.
+  const std::string advice =
+      other_pitch && finish.scallop > 0.0
+          ? "cut it with --pitch " + trimmed_decimal(meant_pitch / scale, 4) + "mm"
+          : "cut it as it was designed, or design it for this workshop (--made-by)";
   return joined({"the lens was designed for a pitch of ", trimmed_decimal(meant_pitch, 4),
                  " mm and a polish of σ ", trimmed_decimal(meant_sigma, 4), " mm, not ",
-                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(sigma, 4),
-                 " mm: cut it as it was designed, or design it for this workshop (--made-by)"});
+                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(sigma, 4), " mm: ", advice});
 }
 
 /// Warns of a speed that the controller's setting would silently lower; empty without such a
 /// setting.
-std::string spindle_warning(const CutPlan& plan, const ProgramFiles& programs) {
-  const int setting = plan.options().post.reader.spindle_limit_setting;
+std::string spindle_warning(const WrittenCut& cut) {
+  const int setting = cut.setup.options.post.reader.spindle_limit_setting;
   if (setting == 0) return {};
   double fastest = 0.0;
-  for (const Tool& tool : tools_of(plan, programs)) fastest = std::max(fastest, tool.spindle_rpm);
+  for (const Tool& tool : tools_of(cut)) fastest = std::max(fastest, tool.spindle_rpm);
   return "the controller runs the spindle no faster than its setting $" + std::to_string(setting) +
          ", silently: set it to at least " + decimal_text(fastest, 0);
 }
 
 /// Light enters a curved front beyond the lens's edges.
-std::string margin_warning(const CutPlan& plan, const Lens& lens) {
-  const double margin = plan.options().workshop.stock.margin;
-  const double needed = overhang(lens.surface, lens.setup);
-  if (plan.options().part != PartKind::kLens || !(needed > margin)) return {};
+std::string margin_warning(const CutSetup& setup) {
+  const double margin = setup.options.workshop.stock.margin;
+  const double needed = overhang(setup.lens->surface, setup.lens->setup);
+  if (setup.options.part != PartKind::kLens || !(needed > margin)) return {};
   return "light enters the front up to " + mm(needed, 2) +
          " beyond the lens's edges, but the blank ends at " + mm(margin, 2) +
          ": the picture's rim stays dark unless stock.margin is at least " +
          mm(std::ceil(10.0 * needed) / 10.0, 1);
 }
 
-std::vector<std::string> warnings_of(const CutPlan& plan, const ProgramFiles& programs,
-                                     const Lens& lens) {
+std::vector<std::string> warnings_of(const WrittenCut& cut) {
+  const CutSetup& setup = cut.setup;
+  const ProgramTime& total = cut.programs.total;
   std::vector<std::string> warnings;
-  const std::string unroughed = unroughed_warning(plan, programs);
+  const std::string unroughed = unroughed_warning(cut);
   if (!unroughed.empty()) warnings.push_back(unroughed);
-  const std::vector<std::string> safety = safety_warnings(plan, programs, lens);
+  const std::vector<std::string> safety = safety_warnings(cut);
   warnings.insert(warnings.end(), safety.begin(), safety.end());
-  for (const std::string& sentence :
-       {index_warning(plan, lens), margin_warning(plan, lens), process_warning(plan, lens),
-        decimals_warning(plan.options())}) {
+  for (const std::string& sentence : {index_warning(setup), margin_warning(setup),
+                                      process_warning(setup), decimals_warning(setup.options)}) {
     if (!sentence.empty()) warnings.push_back(sentence);
   }
-  const Eigen::Vector3d travel = plan.options().workshop.machine.travel;
-  if ((plan.blank().sizes().array() > travel.array()).any()) {
+  const Eigen::Vector3d travel = setup.options.workshop.machine.travel;
+  if ((setup.blank.sizes().array() > travel.array()).any()) {
     warnings.push_back("the blank is larger than the machine's travel of " +
                        decimal_text(travel.x(), 0) + " x " + decimal_text(travel.y(), 0) + " x " +
                        decimal_text(travel.z(), 0) + " mm");
   }
-  const HeightField& field = plan.field();
+  const HeightField& field = setup.field;
   if (field.steepest > kSteepestSlope) {
     warnings.push_back("the surface rises by " + decimal_text(field.steepest, 2) +
                        " mm a millimetre at x " + decimal_text(field.steepest_place.x(), 2) +
                        " y " + decimal_text(field.steepest_place.y(), 2) +
                        ": on slopes above 1 a rim may be left uncut");
   }
-  const std::string spindle = spindle_warning(plan, programs);
+  const std::string spindle = spindle_warning(cut);
   if (!spindle.empty()) warnings.push_back(spindle);
-  if (programs.total.starved > 0) {
+  if (total.starved > 0) {
     warnings.push_back(
-        "the controller will wait for lines " + std::to_string(programs.total.starved) +
-        " times at " + decimal_text(plan.options().workshop.machine.lines_per_second, 0) +
+        "the controller will wait for lines " + std::to_string(total.starved) + " times at " +
+        decimal_text(setup.options.workshop.machine.lines_per_second, 0) +
         " lines/s: the cut then takes " +
-        decimal_text(programs.total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
+        decimal_text(total.stream_limited_seconds / kSecondsPerMinute, 0) + " minutes");
   }
   return warnings;
 }
 
 /// Checks of what the machine must not do, and of what must not be machined.
-std::vector<LimitCheck> all_safety_checks(const CutPlan& plan, const Lens& lens) {
-  std::vector<LimitCheck> checks = safety_checks(plan);
-  if (plan.options().workshop.material.ior > 0.0) {
+std::vector<LimitCheck> all_safety_checks(const WrittenCut& cut) {
+  std::vector<LimitCheck> checks = safety_checks(cut);
+  if (cut.setup.options.workshop.material.ior > 0.0) {
     checks.push_back({"material_ior", "material's refractive index off the design's",
-                      index_error(plan, lens), kIndexTolerance, "", 4});
+                      index_error(cut.setup), kIndexTolerance, "", 4});
   }
   return checks;
 }
 
 /// Safety first. A controller without a line limit takes any load.
-Verdict whole_verdict(const CutPlan& plan, const ProgramFiles& programs,
-                      const std::optional<Prediction>& prediction, const Lens& lens) {
-  CutLimits limits = plan.options().limits;
-  limits.block_rate = plan.options().workshop.machine.lines_per_second;
-  CutFindings findings = findings_of(programs, prediction);
+Verdict whole_verdict(const WrittenCut& cut, const std::optional<Prediction>& prediction) {
+  const CamOptions& options = cut.setup.options;
+  CutLimits limits = options.limits;
+  limits.block_rate = options.workshop.machine.lines_per_second;
+  CutFindings findings = findings_of(cut.programs, prediction);
   if (!(limits.block_rate > 0.0)) findings.block_rate.reset();
-  Verdict verdict = judge_cut(findings, limits, plan.options().stated_limits);
-  const std::vector<LimitCheck> safety = all_safety_checks(plan, lens);
+  Verdict verdict = judge_cut(findings, limits, options.stated_limits);
+  const std::vector<LimitCheck> safety = all_safety_checks(cut);
   verdict.checks.insert(verdict.checks.begin(), safety.begin(), safety.end());
   return verdict;
 }
@@ -551,9 +575,10 @@ std::string fingerprint_of(const Lens& lens) {
 
 }  // namespace
 
-ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
-                       const std::optional<Prediction>& prediction, const Lens& lens) {
-  const CamOptions& options = plan.options();
+ReportData make_report(const WrittenCut& cut, const std::optional<Prediction>& prediction) {
+  const CutSetup& setup = cut.setup;
+  const CamOptions& options = setup.options;
+  const Lens& lens = *setup.lens;
   ReportData data;
   data.job = options.job;
   data.program = program_mark();
@@ -562,25 +587,25 @@ ReportData make_report(const CutPlan& plan, const ProgramFiles& programs,
   data.part = options.part == PartKind::kMould ? "mould" : (data.mirror ? "mirror" : "lens");
   data.lens_size = lens.setup.lens_size;
   data.leakage_options = options.leakage;
-  data.operations = report_operations(plan, programs);
-  data.tools = tools_of(plan, programs);
-  data.parameters = {finish_parameters(plan, plan.model())};
+  data.operations = report_operations(cut);
+  data.tools = tools_of(cut);
+  data.parameters = {finish_parameters(cut)};
   const Process& process = options.workshop.process;
   if (process.rough.enabled || process.semi.enabled) {
     data.parameters.push_back(entry_parameters(process));
   }
-  if (cuts_outline(options, lens.setup)) data.parameters.push_back(outline_parameters(plan));
-  data.setup = setup_sheet(plan, programs, lens);
+  if (setup.cuts_outline()) data.parameters.push_back(outline_parameters(setup));
+  data.setup = setup_sheet(cut);
   data.light = lens.setup;
   data.light_height = lens.surface.vertices.row(2).maxCoeff();
-  data.z_offset = plan.z_offset();
-  data.warnings = warnings_of(plan, programs, lens);
-  data.path = plan.shown_path();
+  data.z_offset = setup.z_offset;
+  data.warnings = warnings_of(cut);
+  data.path = cut.record.shown_path();
   if (prediction) {
-    data.parameters.push_back(polish_parameters(options, lens.setup));
+    data.parameters.push_back(polish_parameters(setup));
     add_prediction(*prediction, lens, data);
   }
-  data.verdict = whole_verdict(plan, programs, prediction, lens);
+  data.verdict = whole_verdict(cut, prediction);
   return data;
 }
 

@@ -136,10 +136,6 @@ double row_move_length(const Eigen::Vector3d& start, const PathMove& move) {
   return 2.0 * radius * std::asin(std::min(0.5 * chord / radius, 1.0));
 }
 
-double pitch_on_slope(double pitch, double steepest) {
-  return pitch / std::sqrt(1.0 + steepest * steepest);
-}
-
 int decimals_for(double tolerance, double slope_tolerance) {
   const double finest = 0.25 * std::min(tolerance, slope_tolerance * kSlopeStretch);
   for (int decimals = 4; decimals < 6; ++decimals) {

@@ -40,10 +40,6 @@ struct RasterOptions {
   int every = 1;
 };
 
-/// Stepover of rows that are `pitch` apart along a surface with the slope `steepest` (rise over
-/// run) across them: it keeps finish_pitch()'s scallop there, too.
-double pitch_on_slope(double pitch, double steepest);
-
 /// Number of decimals, 4 to 6: the smallest whose rounding changes the slope over a kSlopeStretch
 /// by at most a quarter of the slope tolerance and moves a point by at most a quarter of the
 /// tolerance.

@@ -162,22 +162,25 @@ const char* words_for(ZZero zero) {
   return "the face that the blank lies on";
 }
 
-double sample_spacing(const CamOptions& options) {
+Eigen::Vector2d size_to_cut(const CamOptions& options, const OpticalSetup& setup) {
+  const double shrinkage = options.part == PartKind::kMould ? options.shrinkage : 0.0;
+  return setup.lens_size / (1.0 - shrinkage);
+}
+
+double sample_spacing(const CamOptions& options, const Passes& passes) {
   if (options.sample_spacing > 0.0) return options.sample_spacing;
-  const FinishProcess& finish = options.workshop.process.finish;
-  const double pitch = finish_pitch(finish, options.workshop.tool(finish.tool).radius());
-  return std::clamp(std::max(pitch / 6.0, options.workshop.polish.sigma / 3.0),
+  return std::clamp(std::max(passes.pitch / 6.0, options.workshop.polish.sigma / 3.0),
                     cam_limit::kFinestSample, cam_limit::kCoarsestSample);
 }
 
-Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& setup) {
-  const FinishProcess& finish = options.workshop.process.finish;
-  const double across = sample_spacing(options);
+Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& setup,
+                                const Passes& passes) {
+  const double across = sample_spacing(options, passes);
   Eigen::Vector2d spacings = Eigen::Vector2d::Constant(across);
-  if (finish.cross) return spacings;
+  if (passes.cross) return spacings;
   // Scallops do not vary along passes. A Gaussian's weights σ apart sum to its integral within
   // 5e-9.
-  const int axis = finish.along == PassAxis::kX ? 0 : 1;
+  const int axis = passes.axis;
   const double pixel = setup.lens_size[axis] / setup.pixels[axis];
   const double along =
       std::min({kAlongPasses * across, options.workshop.polish.sigma, kAlongPixel * pixel});
@@ -185,11 +188,11 @@ Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& s
   return spacings;
 }
 
-Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& setup) {
-  const FinishProcess& finish = options.workshop.process.finish;
-  Eigen::Vector2d spacings = sample_spacings(options, setup);
-  if (finish.cross) return spacings;
-  const int axis = finish.along == PassAxis::kX ? 0 : 1;
+Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& setup,
+                                 const Passes& passes) {
+  Eigen::Vector2d spacings = sample_spacings(options, setup, passes);
+  if (passes.cross) return spacings;
+  const int axis = passes.axis;
   const double pixel = setup.lens_size[axis] / setup.pixels[axis];
   spacings[axis] =
       std::max(spacings[axis], std::min(kAlongScallops * spacings[axis], kScallopPixel * pixel));

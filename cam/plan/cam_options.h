@@ -20,6 +20,7 @@
 namespace lensforge {
 
 class Description;
+struct Passes;
 
 /// Position of program Z = 0.
 enum class ZZero {
@@ -96,13 +97,18 @@ inline constexpr double kHighestTab = 10.0;
 inline constexpr int kMaxTabs = 100;
 }  // namespace cam_limit
 
-/// Sample spacing of the surface across the passes, mm.
-double sample_spacing(const CamOptions& options);
+/// Size of the surface to cut seen from above, mm: the lens's, or that of the larger mould.
+Eigen::Vector2d size_to_cut(const CamOptions& options, const OpticalSetup& setup);
+
+/// Sample spacing of the surface across the passes, mm. @param passes  on the lens.
+double sample_spacing(const CamOptions& options, const Passes& passes);
 /// The same along x and y: up to three times as large along passes that do not cross, as far as
 /// polish and pixels allow.
-Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& setup);
+Eigen::Vector2d sample_spacings(const CamOptions& options, const OpticalSetup& setup,
+                                const Passes& passes);
 /// The same for an unpolished surface: another three times as large along passes.
-Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& setup);
+Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& setup,
+                                 const Passes& passes);
 
 /// The lens's edge: its outline, or its rectangle; counter-clockwise, mm.
 std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup);

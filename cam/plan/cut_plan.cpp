@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <string>
 #include <utility>
 
 #include "cam/milled/mould.h"
+#include "cam/path/pencil.h"
+#include "cam/path/rough.h"
 #include "cam/path/rough_passes.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
@@ -19,9 +23,9 @@ constexpr double kSketchSpacing = 0.5;
 /// Unit of a program's last decimal where nothing is rounded, mm.
 constexpr double kUnrounded = 1e-9;
 
-std::optional<Lens> mould_to_cut(const Lens& lens, const CamOptions& options) {
-  if (options.part == PartKind::kLens) return std::nullopt;
-  return mould_lens(lens, {options.shrinkage});
+std::shared_ptr<const Lens> mould_to_cut(const Lens& lens, const CamOptions& options) {
+  if (options.part == PartKind::kLens) return nullptr;
+  return std::make_shared<const Lens>(mould_lens(lens, {options.shrinkage}));
 }
 
 /// @throw InputError if the lens is no spline and one is to be cut.
@@ -30,11 +34,6 @@ SurfaceModel model_to_cut(const Lens& lens, const CamOptions& options) {
   if (model != SurfaceModel::kSpline || lens.spline) return model;
   throw InputError("--surface spline: must be facet or smooth, since this lens was designed as " +
                    model_name(lens.model));
-}
-
-Eigen::Vector2d size_to_cut(const Lens& lens, const CamOptions& options) {
-  const double shrinkage = options.part == PartKind::kLens ? 0.0 : options.shrinkage;
-  return lens.setup.lens_size / (1.0 - shrinkage);
 }
 
 /// @throw InputError if the surface is below the table, where no tool can cut.
@@ -66,179 +65,235 @@ double z_offset_of(ZZero zero, double surface_top, double blank_top) {
 
 }  // namespace
 
-CutPlan::CutPlan(const Lens& lens, const CamOptions& options, const Executor& executor,
-                 const CutPlace& place)
-    : lens_(lens),
-      options_(options),
-      place_(place),
-      executor_(executor),
-      mould_lens_(mould_to_cut(lens, options)),
-      model_(model_to_cut(lens, options)),
-      field_(above_table(inspect_height_field(mesh(), size_to_cut(lens, options)))),
-      blank_(options_.workshop.stock.box(field_.box)),
-      z_offset_(z_offset_of(options.z_zero, field_.box.max().z(), blank_.max().z())),
-      decimals_(decimals_of(options_)),
-      profile_(mesh()),
-      stock_(whole_blank(options_.workshop, field_.box)),
-      optical_(optical_surface(cut(), model_)),
-      balls_(optical_, options_, executor),
-      collisions_(profile_, options_.workshop, stock_),
-      watch_(collisions_, options_.workshop.tools, z_offset_,
-             highest_obstacle(options_.workshop, blank_)) {
-  if (cuts_outline(options_, lens_.setup))
-    require_outline_cut(edge_of(lens_.setup), outline_cut(), blank_);
+CutSetup cut_setup(const Lens& lens, const CamOptions& options) {
+  CutSetup setup;
+  setup.lens = &lens;
+  setup.options = options;
+  setup.mould_lens = mould_to_cut(lens, options);
+  setup.model = model_to_cut(lens, options);
+  setup.field = above_table(inspect_height_field(setup.mesh(), size_to_cut(options, lens.setup)));
+  setup.blank = options.workshop.stock.box(setup.field.box);
+  setup.z_offset = z_offset_of(options.z_zero, setup.field.box.max().z(), setup.blank.max().z());
+  setup.optical = optical_surface(setup.mould_lens ? *setup.mould_lens : lens, setup.model);
+  return setup;
 }
 
-std::optional<CastFrame> CutPlan::mould() const {
-  if (options_.part == PartKind::kLens) return std::nullopt;
-  const auto& lens = lens_.surface.vertices;
-  return CastFrame{1.0 / (1.0 - options_.shrinkage), lens.row(0).maxCoeff(), lens.row(2).maxCoeff(),
-                   MouldOptions{}.thickness};
+std::optional<CastFrame> CutSetup::mould() const {
+  if (options.part == PartKind::kLens) return std::nullopt;
+  const auto& vertices = lens->surface.vertices;
+  return CastFrame{1.0 / (1.0 - options.shrinkage), vertices.row(0).maxCoeff(),
+                   vertices.row(2).maxCoeff(), MouldOptions{}.thickness};
 }
 
-double CutPlan::safe_z() const {
-  return to_resolution(safe_height_of(options_.workshop, blank_) + z_offset_,
-                       resolution_of(options_)) -
-         z_offset_;
+double CutSetup::safe_z() const {
+  return to_resolution(safe_height_of(options.workshop, blank) + z_offset, resolution_of(options)) -
+         z_offset;
 }
 
-MoveSink CutPlan::sketched(const std::string& operation, const MoveSink& sink) {
-  sketches_.push_back(std::make_unique<PathSketch>(operation, kSketchSpacing));
-  PathSketch* const sketch = sketches_.back().get();
-  return [sketch, sink](std::span<const PathMove> moves) {
-    sketch->add(moves);
-    sink(moves);
-  };
+OutlineCut CutSetup::outline_cut() const {
+  const RoughProcess& rough = options.workshop.process.rough;
+  const int number = options.outline_tool > 0 ? options.outline_tool : rough.tool;
+  // The program's last decimal must not round it below the blank.
+  const double unit = resolution_of(options);
+  const double bottom = std::ceil((blank.min().z() + z_offset) / unit) * unit - z_offset;
+  return with_tabs_that_fit(edge_of(lens->setup), {options.workshop.tool(number), options.tabs,
+                                                   rough.stepdown, rough.ramp_angle_deg, safe_z(),
+                                                   bottom, options.workshop.process.clearance});
 }
 
-std::vector<ReportPath> CutPlan::shown_path() const {
+CutPasses cut_passes(const CutSetup& setup, const Executor& executor) {
+  CutPasses passes;
+  passes.profile = std::make_shared<const ProfileCutter>(setup.mesh());
+  passes.balls =
+      std::make_shared<const FinishBalls>(setup.optical, setup.options, setup.ground(), executor);
+  passes.finish = passes.balls->passes(setup.options, setup.ground());
+  if (setup.cuts_outline())
+    require_outline_cut(edge_of(setup.lens->setup), setup.outline_cut(), setup.blank);
+  return passes;
+}
+
+CutRecord::CutRecord(const CutSetup& setup)
+    : stock(whole_blank(setup.options.workshop, setup.field.box)) {}
+
+std::vector<ReportPath> CutRecord::shown_path() const {
   std::vector<ReportPath> paths;
-  for (const auto& sketch : sketches_) paths.push_back(sketch->path());
+  for (const auto& sketch : sketches) paths.push_back(sketch->path());
   return paths;
 }
 
-ProgramOperation CutPlan::rough_operation(const RunControl& control) {
-  const Tool& tool = options_.workshop.tool(options_.workshop.process.rough.tool);
-  return {"rough", tool, {}, [this, &control](const MoveSink& sink) {
-            const RoughSite site{profile_, options_.workshop, stock_};
-            return cut_rough(site, executor_, sketched("rough", sink), control).summary;
-          }};
-}
+namespace {
 
-ProgramOperation CutPlan::semi_operation(const RunControl& control) {
-  const Tool& tool = options_.workshop.tool(options_.workshop.process.semi.tool);
-  return {"semi", tool, {}, [this, &control](const MoveSink& sink) {
-            const RoughSite site{profile_, options_.workshop, stock_};
-            return cut_semi(site, executor_, sketched("semi", sink), control).summary;
-          }};
-}
-
-ProgramOperation CutPlan::finish_operation(const FinishPass& pass, const RunControl& control) {
-  const std::string rows = std::to_string(pass.plan.rows) + " rows along " +
-                           (pass.plan.options.along == 0 ? "X" : "Y") + ", stepover " +
-                           decimal_text(pass.plan.pitch, 5) + " mm";
-  return {pass.name, pass.tool, {rows}, [this, pass, &control](const MoveSink& sink) {
-            const RasterPlan& plan = pass.plan;
-            FinishRun run{pass.name, pass.tool, safe_z(), options_.workshop.process.clearance, {}};
-            if (plan.options.traces) {
-              paths_.ideal.emplace_back(plan.radius, 0.0);
-              paths_.fitted.emplace_back(plan.radius, 0.0);
-              run.look = [this](const RasterRow& row) { add_row(row, paths_); };
-            }
-            return cut_finish(*pass.surface, plan, run, executor_, sketched(pass.name, sink),
-                              control);
-          }};
-}
-
-OperationSummary CutPlan::run_pencil(double resolution, const MoveSink& sink,
-                                     const RunControl& control) const {
-  PencilOptions pencil = pencil_options(options_, z_offset_, field_.box.max().z());
+/// The pencil pass, at a resolution of its own.
+OperationSummary run_pencil(const CutSetup& setup, const CutPasses& passes, double resolution,
+                            const MoveSink& sink, const RunControl& control) {
+  const Tool& ball = finishing_ball(setup.options);
+  PencilOptions pencil = pencil_options(setup.options, setup.z_offset, setup.field.box.max().z());
   pencil.resolution = resolution;
-  return cut_pencil(surface(), find_valleys(mesh(), ball().radius(), pencil), pencil,
-                    {"pencil", ball(), safe_z(), {}, {}}, sink, control);
+  return cut_pencil(passes.balls->surface(), find_valleys(setup.mesh(), ball.radius(), pencil),
+                    pencil, {"pencil", ball, setup.safe_z(), {}, {}}, sink, control);
 }
 
-ProgramOperation CutPlan::pencil_operation(const RunControl& control) {
-  return {"pencil", ball(), {}, [this, &control](const MoveSink& sink) {
-            return run_pencil(resolution_of(options_), sketched("pencil", sink), control);
-          }};
-}
+/// The operations of one part, which stream what setup and passes say and fill the record.
+struct Operations {
+  const CutSetup& setup;
+  const CutPasses& passes;
+  CutRecord& record;
+  Executor executor;
+  const RunControl& control;
 
-OutlineCut CutPlan::outline_cut() const {
-  const RoughProcess& rough = options_.workshop.process.rough;
-  const int number = options_.outline_tool > 0 ? options_.outline_tool : rough.tool;
-  // The program's last decimal must not round it below the blank.
-  const double unit = resolution_of(options_);
-  const double bottom = std::ceil((blank_.min().z() + z_offset_) / unit) * unit - z_offset_;
-  return with_tabs_that_fit(edge_of(lens_.setup), {options_.workshop.tool(number), options_.tabs,
-                                                   rough.stepdown, rough.ramp_angle_deg, safe_z(),
-                                                   bottom, options_.workshop.process.clearance});
-}
+  [[nodiscard]] const Process& process() const { return setup.options.workshop.process; }
+  [[nodiscard]] const Tool& tool(int number) const { return setup.options.workshop.tool(number); }
 
-ProgramOperation CutPlan::outline_operation(const RunControl& control) {
-  const OutlineCut cut = outline_cut();
-  const std::string tabs = std::to_string(cut.tabs.count) + " tabs, " +
-                           trimmed_decimal(cut.tabs.width, 3) + " mm wide and " +
-                           trimmed_decimal(cut.tabs.height, 3) + " mm high";
-  return {"outline", cut.tool, {tabs}, [this, cut, &control](const MoveSink& sink) {
-            return cut_outline(edge_of(lens_.setup), cut, stock_, sketched("outline", sink),
-                               control);
-          }};
-}
+  /// A sink that sketches the operation and passes its moves to `sink`.
+  [[nodiscard]] MoveSink sketched(const std::string& operation, const MoveSink& sink) const {
+    record.sketches.push_back(std::make_unique<PathSketch>(operation, kSketchSpacing));
+    PathSketch* const sketch = record.sketches.back().get();
+    return [sketch, sink](std::span<const PathMove> moves) {
+      sketch->add(moves);
+      sink(moves);
+    };
+  }
 
-ProgramPlan CutPlan::programs(const RunControl& control) {
+  [[nodiscard]] RoughSite site() const {
+    return {*passes.profile, setup.options.workshop, record.stock};
+  }
+
+  [[nodiscard]] ProgramOperation rough() const {
+    return {"rough", tool(process().rough.tool), {}, [all = *this](const MoveSink& sink) {
+              return cut_rough(all.site(), all.executor, all.sketched("rough", sink), all.control)
+                  .summary;
+            }};
+  }
+
+  [[nodiscard]] ProgramOperation semi() const {
+    return {"semi", tool(process().semi.tool), {}, [all = *this](const MoveSink& sink) {
+              return cut_semi(all.site(), all.executor, all.sketched("semi", sink), all.control)
+                  .summary;
+            }};
+  }
+
+  [[nodiscard]] OperationSummary run_finish(const FinishPass& pass, const MoveSink& sink) const {
+    FinishRun run{pass.name, pass.tool, setup.safe_z(), process().clearance, {}};
+    if (pass.plan.options.traces) {
+      record.rows.ideal.emplace_back(pass.plan.radius, 0.0);
+      record.rows.fitted.emplace_back(pass.plan.radius, 0.0);
+      run.look = [&rows = record.rows](const RasterRow& row) { add_row(row, rows); };
+    }
+    return cut_finish(*pass.surface, pass.plan, run, executor, sketched(pass.name, sink), control);
+  }
+
+  [[nodiscard]] ProgramOperation finish(const FinishPass& pass) const {
+    const std::string rows = std::to_string(pass.plan.rows) + " rows along " +
+                             (pass.plan.options.along == 0 ? "X" : "Y") + ", stepover " +
+                             decimal_text(pass.plan.pitch, 5) + " mm";
+    return {pass.name, pass.tool, {rows}, [all = *this, pass](const MoveSink& sink) {
+              return all.run_finish(pass, sink);
+            }};
+  }
+
+  [[nodiscard]] ProgramOperation pencil() const {
+    return {"pencil", finishing_ball(setup.options), {}, [all = *this](const MoveSink& sink) {
+              return run_pencil(all.setup, all.passes, resolution_of(all.setup.options),
+                                all.sketched("pencil", sink), all.control);
+            }};
+  }
+
+  [[nodiscard]] ProgramOperation outline() const {
+    const OutlineCut cut = setup.outline_cut();
+    const std::string tabs = std::to_string(cut.tabs.count) + " tabs, " +
+                             trimmed_decimal(cut.tabs.width, 3) + " mm wide and " +
+                             trimmed_decimal(cut.tabs.height, 3) + " mm high";
+    return {"outline", cut.tool, {tabs}, [all = *this, cut](const MoveSink& sink) {
+              return cut_outline(edge_of(all.setup.lens->setup), cut, all.record.stock,
+                                 all.sketched("outline", sink), all.control);
+            }};
+  }
+};
+
+}  // namespace
+
+ProgramPlan plan_programs(const CutSetup& setup, const CutPasses& passes, CutRecord& record,
+                          const Executor& executor, const RunControl& control) {
+  const CamOptions& options = setup.options;
+  const Process& process = options.workshop.process;
+  const double top = setup.blank.max().z() + setup.z_offset;
+  const Operations all{setup, passes, record, executor, control};
   ProgramPlan plan;
-  plan.job = options_.job;
-  plan.z_offset = z_offset_;
-  plan.safe_z = safe_z() + z_offset_;
+  plan.job = options.job;
+  plan.z_offset = setup.z_offset;
+  plan.safe_z = setup.safe_z() + setup.z_offset;
   plan.comments = {"units: mm; X0 Y0: lower left corner of the lens",
-                   std::string("Z0: ") + words_for(options_.z_zero),
-                   "top of the blank: Z " + decimal_text(blank_.max().z() + z_offset_, decimals_)};
-  if (options_.workshop.process.rough.enabled) plan.operations.push_back(rough_operation(control));
-  if (options_.workshop.process.semi.enabled) plan.operations.push_back(semi_operation(control));
-  for (const FinishPass& pass : balls_.passes(options_, ground())) {
-    plan.operations.push_back(finish_operation(pass, control));
-  }
-  if (finish().pencil) plan.operations.push_back(pencil_operation(control));
-  if (cuts_outline(options_, lens_.setup)) plan.operations.push_back(outline_operation(control));
-  for (const ProgramOperation& operation : plan.operations) {
-    watched_.push_back(
-        {operation.name, operation.tool, descent_rule(options_.workshop.process, operation.name)});
-  }
+                   std::string("Z0: ") + words_for(options.z_zero),
+                   "top of the blank: Z " + decimal_text(top, decimals_of(options))};
+  if (process.rough.enabled) plan.operations.push_back(all.rough());
+  if (process.semi.enabled) plan.operations.push_back(all.semi());
+  for (const FinishPass& pass : passes.finish) plan.operations.push_back(all.finish(pass));
+  if (process.finish.pencil) plan.operations.push_back(all.pencil());
+  if (setup.cuts_outline()) plan.operations.push_back(all.outline());
   return plan;
 }
 
-ProgramSettings CutPlan::settings() {
+ProgramSettings program_settings(const CamOptions& options) {
   ProgramSettings settings;
-  settings.decimals = decimals_;
-  settings.blend_tolerance = finish().tolerance;
-  settings.spin_up = options_.spin_up;
-  settings.spindle_by_hand = options_.workshop.machine.spindle_by_hand;
-  settings.coolant = options_.coolant;
-  settings.grouping = options_.grouping;
-  settings.largest_file = options_.largest_file;
-  settings.planner = planner_settings(options_.workshop.machine);
-  settings.look = [this](std::size_t operation, const ProgramLine& line) {
-    watch_.take(watched_[operation], line);
-  };
+  settings.decimals = decimals_of(options);
+  settings.blend_tolerance = options.workshop.process.finish.tolerance;
+  settings.spin_up = options.spin_up;
+  settings.spindle_by_hand = options.workshop.machine.spindle_by_hand;
+  settings.coolant = options.coolant;
+  settings.grouping = options.grouping;
+  settings.largest_file = options.largest_file;
+  settings.planner = planner_settings(options.workshop.machine);
   return settings;
 }
 
-FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunControl& control) {
-  FinishPaths paths = std::move(paths_);
-  if (finish().pencil) {
+namespace {
+
+/// Passes all motions at feed with a tool in the part's operations to `take`, x and y in the lens
+/// frame.
+void read_motions(const PartPrograms& programs, int tool,
+                  const std::function<void(const GcodeMotion&)>& take, const RunControl& control) {
+  for (const WrittenProgram& file : programs.files.files) {
+    const auto any = [&](const auto& holds) {
+      return std::any_of(file.operations.begin(), file.operations.end(), holds);
+    };
+    if (!any([&](const OperationTime& time) {
+          return programs.files.summaries[time.operation].tool == tool;
+        })) {
+      continue;
+    }
+    const auto take_own = [&](const GcodeMotion& motion) {
+      const bool own = any([&](const OperationTime& time) {
+        return motion.line >= time.line && motion.line < time.end;
+      });
+      if (own) take(moved(motion, -programs.corner));
+    };
+    read_path(file.beside.empty() ? file.path : file.beside, programs.files.reader, tool, take_own,
+              control);
+  }
+}
+
+}  // namespace
+
+FinishPaths finish_paths(const CutSetup& setup, const CutPasses& passes, FinishPaths rows,
+                         const PartPrograms& programs, const RunControl& control) {
+  const FinishProcess& finish = setup.options.workshop.process.finish;
+  const Tool& ball = finishing_ball(setup.options);
+  FinishPaths paths = std::move(rows);
+  if (finish.pencil) {
     // The pencil has no rows: its points are already on the drop surface, so nothing is more exact.
-    BallPath pencil(ball().radius(), 0.0);
-    if (!run_pencil(kUnrounded, path_sink(pencil), control).complete) throw Interrupted();
+    BallPath pencil(ball.radius(), 0.0);
+    if (!run_pencil(setup, passes, kUnrounded, path_sink(pencil), control).complete) {
+      throw Interrupted();
+    }
     paths.ideal.push_back(pencil);
     paths.fitted.push_back(std::move(pencil));
   }
-  const AxisStretch stretch = AxisStretch::of(finish());
-  std::vector<Tool> balls{ball()};
-  if (const Tool* const large = larger_ball(options_)) balls.insert(balls.begin(), *large);
+  const AxisStretch stretch = AxisStretch::of(finish);
+  std::vector<Tool> balls{ball};
+  if (const Tool* const large = larger_ball(setup.options)) balls.insert(balls.begin(), *large);
   for (const Tool& tool : balls) {
-    BallPath written(tool.radius(), z_offset_);
-    BallPath stretched(tool.radius(), z_offset_);
+    BallPath written(tool.radius(), setup.z_offset);
+    BallPath stretched(tool.radius(), setup.z_offset);
     const auto take = [&](const GcodeMotion& motion) {
       written.add(motion);
       if (stretch.any()) add_stretched(motion, stretch, stretched);
@@ -248,29 +303,6 @@ FinishPaths CutPlan::take_finish_paths(const ProgramFiles& programs, const RunCo
     if (stretch.any()) paths.stretched.push_back(std::move(stretched));
   }
   return paths;
-}
-
-void CutPlan::read_motions(const ProgramFiles& programs, int tool,
-                           const std::function<void(const GcodeMotion&)>& take,
-                           const RunControl& control) const {
-  for (const WrittenProgram& file : programs.files) {
-    const auto any = [&](const auto& holds) {
-      return std::any_of(file.operations.begin(), file.operations.end(), holds);
-    };
-    if (!any([&](const OperationTime& time) {
-          return programs.summaries[time.operation].tool == tool;
-        })) {
-      continue;
-    }
-    const auto take_own = [&](const GcodeMotion& motion) {
-      const bool own = any([&](const OperationTime& time) {
-        return motion.line >= time.line && motion.line < time.end;
-      });
-      if (own) take(moved(motion, -place_.corner));
-    };
-    read_path(file.beside.empty() ? file.path : file.beside, programs.reader, tool, take_own,
-              control);
-  }
 }
 
 }  // namespace lensforge

@@ -27,8 +27,7 @@ RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, 
   const FinishProcess& finish = options.workshop.process.finish;
   const double radius = finishing_ball(options).radius();
   RasterOptions raster;
-  raster.pitch = finish_pitch(finish, radius);
-  if (finish.scallop > 0.0) raster.pitch = pitch_on_slope(raster.pitch, ground.steepest);
+  raster.pitch = max_pitch(finish, radius, ground.steepest);
   raster.tolerance = finish.tolerance;
   raster.slope_tolerance = aimed_slope(options);
   raster.resolution = resolution_of(options);
@@ -84,12 +83,33 @@ double shortest_move(const CamOptions& options, const Tool& tool) {
   return lines > 0.0 ? kAboveShortest * tool.feed / (60.0 * lines) : 0.0;
 }
 
+FinishGround unknown_ground(const CamOptions& options, const OpticalSetup& setup) {
+  return {{Eigen::Vector2d(0.0, 0.0), size_to_cut(options, setup)}, kUnknownSlope, 0.0};
+}
+
 std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground) {
   const FinishProcess& finish = options.workshop.process.finish;
   std::vector<RasterPlan> plans{finish_raster(options, ground, finish.along)};
   const PassAxis across = finish.along == PassAxis::kX ? PassAxis::kY : PassAxis::kX;
   if (finish.cross) plans.push_back(finish_raster(options, ground, across));
   return plans;
+}
+
+double finish_pitch(const CamOptions& options, const FinishGround& ground) {
+  return finish_rasters(options, ground).front().pitch;
+}
+
+Passes passes_on_lens(const CamOptions& options, const FinishGround& ground) {
+  const FinishProcess& finish = options.workshop.process.finish;
+  Passes passes;
+  passes.cast = options.part == PartKind::kMould;
+  const double scale = passes.cast ? 1.0 / (1.0 - options.shrinkage) : 1.0;
+  passes.pitch = finish_pitch(options, ground) / scale;
+  passes.ball_radius = finishing_ball(options).radius() / scale;
+  passes.axis = finish.along == PassAxis::kX ? 0 : 1;
+  passes.zigzag = finish.style == PassStyle::kZigzag;
+  passes.cross = finish.cross;
+  return passes;
 }
 
 PencilOptions pencil_options(const CamOptions& options, double z_offset, double top) {
@@ -120,10 +140,9 @@ std::unique_ptr<CutSurface> larger_surface(const std::shared_ptr<const OpticalSu
   return surface_to_cut(surface, ball.radius(), executor);
 }
 
-BallBlend::Rows rows_of(const CamOptions& options, const Tool& large) {
-  const FinishProcess& finish = options.workshop.process.finish;
-  const double radius = finishing_ball(options).radius();
-  return {radius, large.radius(), finish_pitch(finish, radius), finish.large_every};
+BallBlend::Rows rows_of(const CamOptions& options, const FinishGround& ground, const Tool& large) {
+  return {finishing_ball(options).radius(), large.radius(), finish_pitch(options, ground),
+          options.workshop.process.finish.large_every};
 }
 
 }  // namespace
@@ -147,12 +166,13 @@ FinishBalls::Shared::Shared(std::unique_ptr<CutSurface> larger, const CutSurface
       lifted_large(*large, large_lift) {}
 
 FinishBalls::FinishBalls(const std::shared_ptr<const OpticalSurface>& surface,
-                         const CamOptions& options, const Executor& executor)
+                         const CamOptions& options, const FinishGround& ground,
+                         const Executor& executor)
     : surface_(surface_to_cut(surface, finishing_ball(options).radius(), executor)) {
   const Tool* const large = larger_ball(options);
   if (large == nullptr) return;
   shared_ = std::make_unique<const Shared>(larger_surface(surface, *large, executor), *surface_,
-                                           rows_of(options, *large), executor);
+                                           rows_of(options, ground, *large), executor);
 }
 
 std::vector<FinishPass> FinishBalls::passes(const CamOptions& options,
@@ -179,10 +199,10 @@ std::vector<FinishPass> FinishBalls::passes(const CamOptions& options,
   return passes;
 }
 
-bool same_balls(const CamOptions& one, const CamOptions& other) {
-  const auto key = [](const CamOptions& options) {
+bool same_balls(const CamOptions& one, const CamOptions& other, const FinishGround& ground) {
+  const auto key = [&](const CamOptions& options) {
     const Tool* const large = larger_ball(options);
-    const double pitch = large == nullptr ? 0.0 : rows_of(options, *large).pitch;
+    const double pitch = large == nullptr ? 0.0 : rows_of(options, ground, *large).pitch;
     return std::tuple(finishing_ball(options).radius(), large == nullptr ? 0.0 : large->radius(),
                       pitch, options.workshop.process.finish.large_every);
   };

@@ -16,9 +16,11 @@
 #include "cam/path/operation.h"
 #include "cam/path/pencil.h"
 #include "cam/plan/cam_options.h"
+#include "cam/tolerance/part_error.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
 #include "core/lens/optical_surface.h"
+#include "core/optics/optical_setup.h"
 #include "machine/gcode/gcode_dialect.h"
 
 namespace lensforge {
@@ -53,8 +55,19 @@ struct FinishGround {
   double z_offset = 0.0;          ///< Program Z − lens-frame z.
 };
 
+/// Stands for the surface as long as it is not known: the lens's rectangle, or the mould's, with
+/// kUnknownSlope. For estimates.
+FinishGround unknown_ground(const CamOptions& options, const OpticalSetup& setup);
+
 /// The finishing raster, and the crossing one if enabled.
 std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground);
+
+/// Stepover of the finishing ball's rows as cut, mm: max_pitch() on the ground's slope, fitted to
+/// its width. The one value that balls, samples, drawn parts, remedies and report take.
+double finish_pitch(const CamOptions& options, const FinishGround& ground);
+
+/// The finishing ball's rows on the lens. A mould is larger than its cast by the shrinkage.
+Passes passes_on_lens(const CamOptions& options, const FinishGround& ground);
 
 /// Options of the pencil pass. @param top  highest point of the surface to cut, mm, lens frame.
 PencilOptions pencil_options(const CamOptions& options, double z_offset, double top);
@@ -77,7 +90,7 @@ class FinishBalls {
   /// @throw InputError naming finish.large_tool if a larger ball is chosen and the surface has
   ///        creases.
   FinishBalls(const std::shared_ptr<const OpticalSurface>& surface, const CamOptions& options,
-              const Executor& executor);
+              const FinishGround& ground, const Executor& executor);
   FinishBalls(const FinishBalls&) = delete;
   FinishBalls& operator=(const FinishBalls&) = delete;
 
@@ -107,8 +120,8 @@ class FinishBalls {
   std::unique_ptr<const Shared> shared_;
 };
 
-/// True if the balls of one set of options are also valid for the other.
-bool same_balls(const CamOptions& one, const CamOptions& other);
+/// True if the balls of one set of options are also valid for the other on the same ground.
+bool same_balls(const CamOptions& one, const CamOptions& other, const FinishGround& ground);
 
 /// The finishing ball's paths in the lens frame, from the exact ones to the written ones.
 struct FinishPaths {

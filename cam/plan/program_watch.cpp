@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
+#include "cam/path/rough_passes.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
@@ -179,6 +181,13 @@ Eigen::Vector3d ProgramWatch::extent() const {
   }
   return extent;
 }
+
+ProgramChecks::ProgramChecks(std::shared_ptr<const ProfileCutter> surface, const Workshop& workshop,
+                             StockMap stock, double z_offset)
+    : surface_(std::move(surface)),
+      collisions_(*surface_, workshop, std::move(stock)),
+      watch_(collisions_, workshop.tools, z_offset,
+             highest_obstacle(workshop, collisions_.stock().blank())) {}
 
 std::string travel_fault(const Eigen::Vector3d& extent, const Eigen::Vector3d& travel) {
   std::string axes;

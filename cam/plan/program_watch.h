@@ -7,12 +7,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "cam/contact/profile_cutter.h"
 #include "cam/path/collision.h"
+#include "cam/path/stock_map.h"
 #include "cam/post/program_reader.h"
 #include "cam/workshop/tool.h"
+#include "cam/workshop/workshop.h"
 
 namespace lensforge {
 
@@ -78,6 +82,35 @@ class ProgramWatch {
   std::map<std::string, Fault> faults_;
   Eigen::AlignedBox2d places_;                  ///< All known ones, seen from above.
   std::map<int, Eigen::AlignedBox1d> heights_;  ///< Tool → heights of its tip.
+};
+
+/// All checks of the programs of one blank.
+class ProgramChecks {
+ public:
+  /// @param surface  all that is to be left of the blank. @param workshop  must outlive this.
+  /// @param stock    the blank. @param z_offset  program Z − lens-frame z, mm.
+  ProgramChecks(std::shared_ptr<const ProfileCutter> surface, const Workshop& workshop,
+                StockMap stock, double z_offset);
+  ProgramChecks(const ProgramChecks&) = delete;
+  ProgramChecks& operator=(const ProgramChecks&) = delete;
+
+  /// Takes the next line that was read back.
+  void take(const WatchedOperation& operation, const ProgramLine& line) {
+    watch_.take(operation, line);
+  }
+
+  [[nodiscard]] const std::vector<Collision>& collisions() const {
+    return collisions_.collisions();
+  }
+  /// Descents that are too steep for their feed.
+  [[nodiscard]] const std::vector<SteepDescent>& descents() const { return collisions_.descents(); }
+  /// Other faults.
+  [[nodiscard]] const ProgramWatch& watch() const { return watch_; }
+
+ private:
+  std::shared_ptr<const ProfileCutter> surface_;
+  CollisionCheck collisions_;
+  ProgramWatch watch_;
 };
 
 /// Names the axes whose extent exceeds the machine's travel, in a sentence; empty if none.

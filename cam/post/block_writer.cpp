@@ -8,7 +8,7 @@
 
 #include "cam/post/post_description.h"
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/planner/planner_model.h"
 
@@ -343,7 +343,8 @@ bool BlockWriter::is_rapid_feed(double feed) const {
 }
 
 void BlockWriter::end_rapid(std::size_t feed) {
-  if (post_.rapids_are_feeds()) add("F" + feed_text(post_, options_.rapid_feeds[feed]));
+  if (post_.rapids_are_feeds())
+    add(std::string(1, 'F').append(feed_text(post_, options_.rapid_feeds[feed])));
   feed_stands_ = false;
   text_.line(line_);
   line_.clear();

@@ -104,6 +104,20 @@ const SurfaceField* PartSurfaces::held(const SurfaceField* field) {
   return held_.back().get();
 }
 
+CutSurfaces::CutSurfaces(const CutSetup& setup, const CutPasses& passes, FinishPaths paths,
+                         const Executor& executor)
+    : cut_(meant_surface(setup.optical)),
+      rounded_(cut_->rounded(passes.balls->surface(), setup.rectangle(), executor)) {
+  const Lens& lens = *setup.lens;
+  // The mould's surface differs from the surface of the lens cast in it.
+  if (setup.mould()) lens_ = meant_surface(optical_surface(lens, setup.model));
+  const SurfaceField& meant = lens_ ? lens_->field() : cut_->field();
+  const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);
+  surfaces_.emplace(
+      PartSurfaces::Design{meant, *rounded_, rectangle, setup.blank.max().z(), setup.mould()},
+      std::move(paths), setup.options.workshop.polish);
+}
+
 LeakageChain PartSurfaces::chain() const {
   LeakageChain chain;
   chain.designed = {surface_name::kDesigned, &design_.surface};

@@ -15,6 +15,7 @@
 #include "cam/milled/polished_field.h"
 #include "cam/milled/rounded_field.h"
 #include "cam/milled/surface_field.h"
+#include "cam/plan/cut_plan.h"
 #include "cam/plan/finishing.h"
 #include "core/compute/executor.h"
 #include "core/image/rasters.h"
@@ -78,6 +79,24 @@ class PartSurfaces {
   std::vector<std::unique_ptr<HeldField>> held_;
   std::vector<const SurfaceField*> raw_;                  ///< In the order of the chain.
   std::vector<std::unique_ptr<PolishedField>> polished_;  ///< In the same order.
+};
+
+/// The surfaces of one cut with all that they are made from. Not for several threads at once.
+class CutSurfaces {
+ public:
+  /// @param setup, passes  must outlive this. @param paths  finish_paths().
+  CutSurfaces(const CutSetup& setup, const CutPasses& passes, FinishPaths paths,
+              const Executor& executor);
+  CutSurfaces(const CutSurfaces&) = delete;
+  CutSurfaces& operator=(const CutSurfaces&) = delete;
+
+  [[nodiscard]] const PartSurfaces& surfaces() const { return *surfaces_; }
+
+ private:
+  std::unique_ptr<MeantSurface> cut_;
+  std::unique_ptr<MeantSurface> lens_;  ///< Null if it is the surface that is cut.
+  std::unique_ptr<RoundedField> rounded_;
+  std::optional<PartSurfaces> surfaces_;
 };
 
 /// Names of the surfaces rendered in addition to the chain's.

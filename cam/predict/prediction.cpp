@@ -81,10 +81,10 @@ ReportMap height_map(const LeakMap& map) {
 }  // namespace
 
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Executor& executor, const RunControl& control) {
+                        const Passes& passes, const Executor& executor, const RunControl& control) {
   Prediction result;
   LeakageChain chain = surfaces.chain();
-  const Eigen::Vector2d spacings = sample_spacings(options, lens.setup);
+  const Eigen::Vector2d spacings = sample_spacings(options, lens.setup, passes);
   const GridWindow grid = sampled_grid(lens.setup.lens_size, spacings);
   PartLayers layers(
       {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
@@ -97,7 +97,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   }
   for (NamedSurface& other : chain.others) {
     if (other.name != surface_name::kMilled) continue;
-    other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup));
+    other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup, passes));
   }
   CreaseMapper creases(grid, {});
   const auto keep = [&](const SurfaceField& field, const CellRange& tile,
@@ -230,12 +230,13 @@ Exchange exchange(const LeakageResult& predicted, const FluxPicture& before,
 }  // namespace
 
 TrialCut::TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor)
-    : site_(site), options_(changed), executor_(executor), balls_(&site.plan.balls()) {
-  if (!same_balls(changed, site.plan.options())) {
-    own_ = std::make_unique<const FinishBalls>(site.plan.optical(), changed, executor);
+    : site_(site), options_(changed), executor_(executor), balls_(site.passes.balls.get()) {
+  const FinishGround ground = site.setup.ground();
+  if (!same_balls(changed, site.setup.options, ground)) {
+    own_ = std::make_unique<const FinishBalls>(site.setup.optical, changed, ground, executor);
     balls_ = own_.get();
   }
-  passes_ = balls_->passes(changed, site.plan.ground());
+  passes_ = balls_->passes(changed, ground);
   for (FinishPass& pass : passes_) pass.plan.options.traces = false;
 }
 
@@ -290,14 +291,14 @@ std::vector<BallPath> TrialCut::paths_around(const Eigen::AlignedBox2d& box,
 void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
                           const RunControl& control) const {
   const PencilOptions pencil =
-      pencil_options(options_, site_.plan.z_offset(), site_.plan.part_box().max().z());
+      pencil_options(options_, site_.setup.z_offset, site_.setup.field.box.max().z());
   std::vector<Valley> inside;
   for (const Valley& valley :
-       find_valleys(site_.plan.mesh(), finishing_ball(options_).radius(), pencil)) {
+       find_valleys(site_.setup.mesh(), finishing_ball(options_).radius(), pencil)) {
     for (Valley& part : parts_in(valley, box)) inside.push_back(std::move(part));
   }
   if (inside.empty()) return;
-  const FinishRun run{"pencil", finishing_ball(options_), site_.plan.blank().max().z(), {}, {}};
+  const FinishRun run{"pencil", finishing_ball(options_), site_.setup.blank.max().z(), {}, {}};
   if (!cut_pencil(balls_->surface(), inside, pencil, run, sink, control).complete) {
     throw Interrupted();
   }
@@ -307,28 +308,30 @@ void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
 /// row is level and its cut extends a radius farther.
 LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const {
   const RunControl silent(control.stop_token(), {});
-  const CamOptions& before = site_.plan.options();
+  const CamOptions& before = site_.setup.options;
+  const OpticalSetup& optics = site_.setup.lens->setup;
   const GridWindow grid =
-      sampled_grid(site_.lens.setup.lens_size, sample_spacings(before, site_.lens.setup));
-  const CellGrid fine = refined(grid, place.cells, sample_spacings(options_, site_.lens.setup));
-  const std::optional<CastFrame> mould = site_.plan.mould();
+      sampled_grid(optics.lens_size, sample_spacings(before, optics, site_.setup.passes()));
+  const CellGrid fine =
+      refined(grid, place.cells,
+              sample_spacings(options_, optics, passes_on_lens(options_, site_.setup.ground())));
+  const std::optional<CastFrame> mould = site_.setup.mould();
   const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
                           (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   const double beyond = (mould ? mould->scale : 1.0) * polished + passes_.front().tool.diameter;
   const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   const Eigen::AlignedBox2d box =
       grown_within(as_written(in_mould(box_of(grid, place.cells), mould), stretch), beyond,
-                   site_.plan.rectangle());
-  const MilledField milled(paths_around(box, silent), site_.plan.blank().max().z());
+                   site_.setup.rectangle());
+  const MilledField milled(paths_around(box, silent), site_.setup.blank.max().z());
   std::optional<CastField> cast;
   if (mould) cast.emplace(milled, *mould);
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
-  const Eigen::Vector2d size = site_.lens.setup.lens_size;
-  const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), size},
+  const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), optics.lens_size},
                            options_.workshop.polish);
-  FieldRenderSetup setup{.optics = site_.lens.setup,
+  FieldRenderSetup setup{.optics = optics,
                          .grid = grid,
-                         .surface_height = site_.lens.surface.vertices.row(2).mean()};
+                         .surface_height = site_.setup.lens->surface.vertices.row(2).mean()};
   const FluxPicture predicted = render_cells(site_.part, setup, place.cells, executor_, silent);
   setup.grid = fine.grid;
   const FluxPicture now = render_cells(part, setup, fine.cells, executor_, silent);
@@ -400,12 +403,12 @@ Change with_half_the_polish_and_pitch(const CamOptions& options, double pitch) {
 }
 
 /// Changes to try against a cause other than creases, in this order.
-std::vector<Change> changes_against(const std::string& cause, const CutPlan& plan) {
-  const CamOptions& options = plan.options();
-  if (cause == leak_cause::kScallop) return {with_half_the_pitch(options, plan.pitch())};
+std::vector<Change> changes_against(const std::string& cause, const CutSetup& setup) {
+  const CamOptions& options = setup.options;
+  if (cause == leak_cause::kScallop) return {with_half_the_pitch(options, setup.pitch())};
   if (cause == leak_cause::kChord) return {with_half_the_tolerances(options)};
   if (cause == leak_cause::kPolish) {
-    return {with_half_the_polish(options), with_half_the_polish_and_pitch(options, plan.pitch())};
+    return {with_half_the_polish(options), with_half_the_polish_and_pitch(options, setup.pitch())};
   }
   const auto finer = with_another_decimal(options);
   if (cause == leak_cause::kDecimals && finer) return {*finer};
@@ -428,10 +431,10 @@ class Trials {
       : site_(site),
         executor_(executor),
         control_(control),
-        now_(TrialCut(site, site.plan.options(), executor).work(control)) {}
+        now_(TrialCut(site, site.setup.options, executor).work(control)) {}
 
   void run(const Change& change, const std::vector<LeakPlace*>& places) {
-    if (places.empty() || !is_valid(change.options, site_.lens)) return;
+    if (places.empty() || !is_valid(change.options, *site_.setup.lens)) return;
     const TrialCut cut(site_, change.options, executor_);
     const TrialCut::Work& work = work_of(change, cut);
     for (LeakPlace* place : places) {
@@ -485,14 +488,14 @@ bool is_halved(const LeakPlace* place) {
 void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
                   const RunControl& control) {
   Trials trials(site, executor, control);
-  const CamOptions& options = site.plan.options();
+  const CamOptions& options = site.setup.options;
   for (std::size_t rank = 0; rank < kMaxCauses; ++rank) {
     std::vector<LeakPlace*> creased;
     for (LeakPlace& place : places) {
       const std::vector<std::string> causes = causes_of(place);
       if (rank >= causes.size() || is_halved(&place)) continue;
       if (causes[rank] == leak_cause::kCrease) creased.push_back(&place);
-      for (const Change& change : changes_against(causes[rank], site.plan)) {
+      for (const Change& change : changes_against(causes[rank], site.setup)) {
         if (!is_halved(&place)) trials.run(change, {&place});
       }
     }
@@ -505,76 +508,43 @@ void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const E
 
 namespace {
 
-/// A cut and its picture, for drawing parts.
-struct ToleranceSite {
-  const CutPlan& plan;
-  const Lens& lens;
-  const PartSurfaces& surfaces;
-  const FluxPicture& designed;  ///< Picture of the design.
-};
-
-/// The rows' layout on the lens: a mould is larger by its cast's shrinkage.
-Passes passes_of(const CamOptions& options, const CutPlan& plan) {
-  const FinishProcess& finish = options.workshop.process.finish;
-  const std::optional<CastFrame> mould = plan.mould();
-  const double scale = mould ? mould->scale : 1.0;
-  Passes passes;
-  passes.pitch = plan.pitch() / scale;
-  passes.ball_radius = finishing_ball(options).radius() / scale;
-  passes.axis = finish.along == PassAxis::kX ? 0 : 1;
-  passes.zigzag = finish.style == PassStyle::kZigzag;
-  passes.cross = finish.cross;
-  passes.cast = mould.has_value();
-  return passes;
-}
-
 /// Nominal values that a cut's programs assume.
-PartPlan part_plan(const CamOptions& options, const Lens& lens, const CutPlan& plan) {
-  const Workshop& shop = options.workshop;
-  return {lens.setup, passes_of(options, plan), shop.polish,
+PartPlan part_plan(const CutSetup& setup) {
+  const Workshop& shop = setup.options.workshop;
+  return {setup.lens->setup, setup.passes(), shop.polish,
           shop.polish.sigma * (1.0 + kSigmaBound * shop.tolerances.polish_sigma)};
 }
 
 /// Draws CamOptions::tolerances parts with the workshop's errors and predicts them.
-/// @throw Interrupted
-ToleranceForecast draw_parts(const ToleranceSite& site, const Executor& executor,
+/// @param designed  picture of the design. @throw Interrupted
+ToleranceForecast draw_parts(const CutSetup& setup, const PartSurfaces& surfaces,
+                             const FluxPicture& designed, const Executor& executor,
                              const RunControl& control) {
-  const CamOptions& options = site.plan.options();
-  const PartPlan plan = part_plan(options, site.lens, site.plan);
-  const PartModel model(site.surfaces.milled(), site.surfaces.designed(), plan, executor, control);
-  const ErrorSource source{options.workshop.tolerances, site.lens.setup.lens_size, plan.passes,
+  const CamOptions& options = setup.options;
+  const Lens& lens = *setup.lens;
+  const PartPlan plan = part_plan(setup);
+  const PartModel model(surfaces.milled(), surfaces.designed(), plan, executor, control);
+  const ErrorSource source{options.workshop.tolerances, lens.setup.lens_size, plan.passes,
                            static_cast<std::uint64_t>(options.tolerance_seed)};
-  const PictureJudge judge(site.lens.target, site.designed, options.leakage);
+  const PictureJudge judge(lens.target, designed, options.leakage);
   return forecast_parts(model, source, judge, options.tolerances, executor, control);
-}
-
-Eigen::AlignedBox2d cut_rectangle(const CutPlan& plan) {
-  const Eigen::AlignedBox3d& box = plan.part_box();
-  return {box.min().head<2>(), box.max().head<2>()};
 }
 
 }  // namespace
 
-Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& programs,
+Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const CutSurfaces& cut,
                        const Executor& executor, const RunControl& control) {
-  const CamOptions& options = plan.options();
-  const std::unique_ptr<MeantSurface> cut = meant_surface(plan.optical());
-  const auto rounded = cut->rounded(plan.surface(), cut_rectangle(plan), executor);
-  // The mould's surface differs from the surface of the lens cast in it.
-  std::unique_ptr<MeantSurface> meant;
-  if (plan.mould()) meant = meant_surface(optical_surface(lens, plan.model()));
-  const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);
-  const PartSurfaces surfaces({meant ? meant->field() : cut->field(), *rounded, rectangle,
-                               plan.blank().max().z(), plan.mould()},
-                              plan.take_finish_paths(programs, control), options.workshop.polish);
-  Prediction prediction = predict_part(surfaces, lens, options, executor, control);
+  const CamOptions& options = setup.options;
+  const PartSurfaces& surfaces = cut.surfaces();
+  Prediction prediction =
+      predict_part(surfaces, *setup.lens, options, setup.passes(), executor, control);
   if (options.remedies) {
-    try_remedies({plan, lens, surfaces.designed(), surfaces.part(), prediction.leakage},
+    try_remedies({setup, passes, surfaces.designed(), surfaces.part(), prediction.leakage},
                  prediction.places, executor, control);
   }
   if (options.tolerances > 0) {
     prediction.tolerances =
-        draw_parts({plan, lens, surfaces, prediction.leakage.designed.picture}, executor, control);
+        draw_parts(setup, surfaces, prediction.leakage.designed.picture, executor, control);
   }
   return prediction;
 }

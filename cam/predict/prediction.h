@@ -15,7 +15,6 @@
 #include "cam/path/operation.h"
 #include "cam/plan/cam_options.h"
 #include "cam/plan/cut_plan.h"
-#include "cam/post/program_writer.h"
 #include "cam/predict/part_surfaces.h"
 #include "cam/report/report_data.h"
 #include "cam/tolerance/tolerance_forecast.h"
@@ -44,13 +43,14 @@ inline constexpr double kMeshSpacing = 0.1;
 
 /// Renders every surface from the design to the polished part and finds where light leaks. Memory
 /// does not grow with the number of samples. @throw Interrupted
+/// @param passes  on the lens.
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Executor& executor, const RunControl& control);
+                        const Passes& passes, const Executor& executor, const RunControl& control);
 
 /// A predicted cut, for trying its places again.
 struct TrialSite {
-  const CutPlan& plan;
-  const Lens& lens;
+  const CutSetup& setup;
+  const CutPasses& passes;
   const SurfaceField& designed;  ///< Of the lens.
   const SurfaceField& part;      ///< As predicted.
   const LeakageResult& leakage;
@@ -64,7 +64,7 @@ struct TrialSite {
 /// their moves join elsewhere.
 class TrialCut {
  public:
-  /// @param changed  may differ from the plan's options in finishing tool and process, decimals,
+  /// @param changed  may differ from the setup's options in finishing tool and process, decimals,
   ///                 tolerances and polishing.
   /// All references must outlive this. @pre `changed` is valid for the lens.
   TrialCut(const TrialSite& site, const CamOptions& changed, const Executor& executor);
@@ -104,10 +104,9 @@ class TrialCut {
 void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
                   const RunControl& control);
 
-/// Predicts the picture of a lens whose programs are written, with the remedies and tolerances that
-/// its options request. Takes the plan's finishing paths.
-/// @param programs  with this plan's operations alone. @throw Interrupted
-Prediction predict_cut(CutPlan& plan, const Lens& lens, const ProgramFiles& programs,
+/// Predicts the picture of a lens from the surfaces of its cut, with the remedies and tolerances
+/// that its options request. @throw Interrupted
+Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const CutSurfaces& cut,
                        const Executor& executor, const RunControl& control);
 
 }  // namespace lensforge

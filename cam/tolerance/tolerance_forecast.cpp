@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

@@ -215,9 +215,11 @@ const Tool& Workshop::tool(int number) const {
   throw InputError("tool " + std::to_string(number) + ": the workshop has no tool of this number");
 }
 
-double finish_pitch(const FinishProcess& process, double ball_radius) {
+double max_pitch(const FinishProcess& process, double ball_radius, double steepest) {
   if (!(process.scallop > 0.0)) return process.pitch;
-  return 2.0 * std::sqrt(process.scallop * (2.0 * ball_radius - process.scallop));
+  const double along_surface =
+      2.0 * std::sqrt(process.scallop * (2.0 * ball_radius - process.scallop));
+  return along_surface / std::sqrt(1.0 + steepest * steepest);
 }
 
 void validate(const Workshop& workshop, const std::string& file) {

@@ -68,7 +68,7 @@ struct SemiProcess {
 struct FinishProcess {
   int tool = 1;               ///< Tool::number, a ball.
   double pitch = 0.06;        ///< Maximum distance of passes, mm, in 0 … its diameter.
-  double scallop = 0.0;       ///< If > 0, mm: determines the pitch, see finish_pitch().
+  double scallop = 0.0;       ///< If > 0, mm: determines the pitch, see max_pitch().
   double tolerance = 0.0005;  ///< Maximum distance from the drop curve, mm, > 0.
   /// Maximum error of a move's direction, rad, > 0. Polishing does not remove an error that
   /// neighbouring rows share; for leakage and number of moves by value see docs/tuning.md,
@@ -106,9 +106,14 @@ struct Process {
   friend bool operator==(const Process&, const Process&) = default;
 };
 
-/// Maximum pitch as cut, mm: FinishProcess::pitch, or the pitch that leaves scallops of
-/// FinishProcess::scallop on a plane, 2√(h(2R − h)).
-double finish_pitch(const FinishProcess& process, double ball_radius);
+/// Slope of a surface that is not known yet: it counts as level.
+inline constexpr double kUnknownSlope = 0.0;
+
+/// Maximum stepover of the finishing ball's rows, mm: FinishProcess::pitch, or the stepover that
+/// leaves scallops of FinishProcess::scallop on a plane that rises by `steepest` (rise over run, s)
+/// across the rows, 2√(h(2R − h)) / √(1 + s²). Rows are cut at finish_pitch(), which fits it to the
+/// surface's width.
+double max_pitch(const FinishProcess& process, double ball_radius, double steepest);
 
 /// Model of polishing; all lengths in mm.
 struct PolishModel {

@@ -351,7 +351,9 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::string in_quotes(std::string_view text) {
-  return std::string("'") + printable_line(text, kLongestValue) + "'";
+  std::string quoted = "'";
+  quoted += printable_line(text, kLongestValue);
+  return quoted += "'";
 }
 
 /// The text between `before` and `after`; empty if there is none.

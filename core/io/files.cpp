@@ -26,10 +26,8 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPartial = ".partial-";
 
-std::string reason(int error) { return std::generic_category().message(error); }
-
 [[noreturn]] void fail_to_write(const fs::path& path, int error) {
-  throw RunError(path.string() + ": cannot be written: " + reason(error));
+  throw RunError(path.string() + ": cannot be written: " + system_reason(error));
 }
 
 /// A new empty file, or the errno value of the failure.
@@ -81,7 +79,7 @@ const char* kind_of(mode_t mode) {
 }
 
 [[noreturn]] void fail_to_read(const fs::path& path, int error) {
-  throw InputError(path.string() + ": cannot be read: " + reason(error));
+  throw InputError(path.string() + ": cannot be read: " + system_reason(error));
 }
 
 void require_regular(const struct stat& status, const fs::path& path) {
@@ -215,14 +213,14 @@ void require_writable_folder(const fs::path& folder) {
   fs::create_directories(folder, error);
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) {
-    const std::string why = error ? error.message() : reason(ENOTDIR);
+    const std::string why = error ? error.message() : system_reason(ENOTDIR);
     throw InputError(folder.string() + ": cannot be made a folder: " + why);
   }
   const Beside probe = make_beside(folder / "probe");
   remove_quietly(probe.path);
   if (probe.error != 0) {
     throw InputError(folder.string() +
-                     ": files cannot be made in this folder: " + reason(probe.error));
+                     ": files cannot be made in this folder: " + system_reason(probe.error));
   }
 }
 
@@ -248,6 +246,8 @@ bool write_all(int descriptor, std::string_view bytes) {
   }
   return true;
 }
+
+std::string system_reason(int error) { return std::generic_category().message(error); }
 
 namespace {
 

@@ -124,6 +124,9 @@ class Descriptor {
 /// refuses them, with its reason in errno.
 bool write_all(int descriptor, std::string_view bytes);
 
+/// The system's words for an errno value.
+std::string system_reason(int error);
+
 /// SHA-256 (FIPS 180-4) of bytes added piece by piece.
 class Sha256 {
  public:

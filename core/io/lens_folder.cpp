@@ -123,8 +123,7 @@ constexpr std::chrono::milliseconds kBetweenAttempts{2};
 FolderLock::FolderLock(const fs::path& folder, Kind kind) {
   open(folder);
   if (!folder_.open()) {
-    throw InputError(folder.string() +
-                     ": cannot be opened: " + std::generic_category().message(errno));
+    throw InputError(folder.string() + ": cannot be opened: " + system_reason(errno));
   }
   if (!attempt(kind)) refuse_held(folder);
 }

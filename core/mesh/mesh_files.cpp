@@ -196,7 +196,7 @@ void write_records(const SurfaceMesh& mesh, const Matrix& records, const fs::pat
     write_blocks(mesh, records, file);
     if (file) return;
     throw RunError(path.string() + ": cannot be written: " +
-                   (errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
+                   (errno != 0 ? system_reason(errno) : "unknown reason"));
   });
 }
 

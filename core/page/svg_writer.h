@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/page/html_text.h"
+#include "core/page/html_page.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

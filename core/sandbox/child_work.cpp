@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/sandbox/child_work.h"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -10,19 +17,13 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
-#include <fcntl.h>
 #include <fstream>
 #include <mutex>
 #include <new>
 #include <optional>
-#include <poll.h>
 #include <string_view>
-#include <sys/prctl.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
 #include <system_error>
 #include <thread>
-#include <unistd.h>
 #include <vector>
 
 #include "core/error.h"
@@ -204,8 +205,7 @@ class Child {
 
  private:
   [[noreturn]] static void fail() {
-    throw RunError("a process that reads files cannot be started: " +
-                   std::generic_category().message(errno));
+    throw RunError("a process that reads files cannot be started: " + system_reason(errno));
   }
 
   pid_t pid_ = -1;

@@ -322,7 +322,7 @@ class RankTransforms {
   std::vector<double> packed_;
 };
 
-/// GridPreconditioner over ranks. Vectors hold the vertices that the rank owns. apply() is
+/// GridPreconditionerOn over ranks. Vectors hold the vertices that the rank owns. apply() is
 /// collective.
 class RankPreconditioner {
  public:

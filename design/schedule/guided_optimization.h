@@ -33,7 +33,7 @@ class GuidedStage {
   virtual ObjectiveEvaluation evaluate(const Eigen::Matrix3Xd& vertices,
                                        Eigen::Matrix3Xd& gradient) = 0;
 
-  /// See GridPreconditioner.
+  /// See GridPreconditionerOn.
   virtual void set_symbols(const GridSymbol& xy, const GridSymbol& z) = 0;
   virtual void set_reach(const Eigen::Matrix3Xd& reach) = 0;
   virtual Eigen::Matrix3Xd apply_root(const Eigen::Matrix3Xd& g) = 0;

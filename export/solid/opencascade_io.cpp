@@ -27,7 +27,6 @@
 
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
-#include "core/io/descriptor.h"
 #include "core/io/files.h"
 #include "core/sandbox/child_work.h"
 

@@ -8,7 +8,6 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/files.h"
 #include "core/text/lower_case.h"
 
 namespace lensforge {

@@ -30,7 +30,7 @@
 #include <thread>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
+#include "core/io/files.h"
 
 namespace lensforge {
 namespace {

@@ -18,7 +18,6 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/io/descriptor.h"
 #include "core/io/files.h"
 #include "core/text/printable.h"
 

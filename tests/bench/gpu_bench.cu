@@ -101,7 +101,7 @@ struct KernelBytes {
   }
 };
 
-/// By the sizes of what objective_view.h and grid_preconditioner_on.h list: a frame has 72 bytes, a
+/// By the sizes of what objective_view.h and grid_preconditioner.h list: a frame has 72 bytes, a
 /// map 24, corner derivatives 72, connectivity 12 a face or neighbour table.
 const std::map<std::string, KernelBytes>& least_bytes() {
   static const std::map<std::string, KernelBytes> bytes{

@@ -66,7 +66,8 @@ struct Shop {
   FinishBalls balls;
 
   explicit Shop(int large_tool, int every = 1)
-      : options(options_with(large_tool, every)), balls(surface, options, Executor::cpu(2)) {}
+      : options(options_with(large_tool, every)),
+        balls(surface, options, ground(), Executor::cpu(2)) {}
 
   [[nodiscard]] std::vector<PathMove> moves_of(const FinishPass& pass) const {
     std::vector<PathMove> moves;
@@ -272,7 +273,7 @@ TEST(FinishBalls, NothingIsLeftOfAGentleSurface) {
                          [](double x, double) { return 6.0 + 0.05 * std::sin(0.5 * x); }),
       SurfaceModel::kSmooth);
   const CamOptions options = options_with(4);
-  const FinishBalls balls(surface, options, Executor::serial());
+  const FinishBalls balls(surface, options, ground(), Executor::serial());
   const std::vector<FinishPass> passes = balls.passes(options, ground());
   ASSERT_EQ(passes.size(), 1U);
   EXPECT_EQ(passes.front().name, "large");
@@ -287,9 +288,9 @@ TEST(FinishBalls, ABallAsLargeAsTheLensIsRefused) {
 
 TEST(FinishBalls, FacetsAreRefusedForALargerBall) {
   const auto facets = valley_surface(SurfaceModel::kFacet);
-  EXPECT_THAT(
-      message_of<InputError>([&] { FinishBalls(facets, options_with(4), Executor::serial()); }),
-      AllOf(HasSubstr("finish.large_tool 4"), HasSubstr("--surface smooth")));
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { FinishBalls(facets, options_with(4), ground(), Executor::serial()); }),
+              AllOf(HasSubstr("finish.large_tool 4"), HasSubstr("--surface smooth")));
 }
 
 }  // namespace

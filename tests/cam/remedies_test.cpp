@@ -9,7 +9,6 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
-#include "cam/milled/designed_field.h"
 #include "cam/plan/finishing.h"
 #include "cam/post_plans.h"
 #include "cam/predict/part_surfaces.h"
@@ -56,39 +55,34 @@ class Predicted {
   Predicted(Lens lens, const CamOptions& options)
       : lens_(std::move(lens)),
         options_(options),
-        plan_(lens_, options_, Executor::cpu(2)),
-        cut_(plan_.mesh()),
-        designed_(lens_.surface) {
+        setup_(cut_setup(lens_, options_)),
+        passes_(cut_passes(setup_, executor_)) {
     const TempFolder folder;
     const RunControl control;
+    CutRecord record(setup_);
     const ProgramFiles programs =
-        write_programs(plan_.programs(control), options_.post, plan_.settings(), folder.path(), {});
-    cutter_ = plan_.surface().cutter(plan_.rectangle(), executor_);
-    rounded_.emplace(cut_, cut_.grid(), *cutter_, executor_);
-    const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens_.setup.lens_size);
-    surfaces_.emplace(PartSurfaces::Design{designed_, *rounded_, rectangle, plan_.blank().max().z(),
-                                           plan_.mould()},
-                      plan_.take_finish_paths(programs, control), options_.workshop.polish);
-    prediction_ = predict_part(*surfaces_, lens_, options_, executor_, control);
+        write_programs(plan_programs(setup_, passes_, record, executor_, control), options_.post,
+                       program_settings(options_), folder.path(), {});
+    cut_.emplace(setup_, passes_,
+                 finish_paths(setup_, passes_, std::move(record.rows), {programs}, control),
+                 executor_);
+    prediction_ = predict_part(surfaces(), lens_, options_, setup_.passes(), executor_, control);
   }
 
   [[nodiscard]] TrialSite site() const {
-    return {plan_, lens_, designed_, surfaces_->part(), prediction_.leakage};
+    return {setup_, passes_, surfaces().designed(), surfaces().part(), prediction_.leakage};
   }
   [[nodiscard]] const Executor& executor() const { return executor_; }
-  [[nodiscard]] const PartSurfaces& surfaces() const { return *surfaces_; }
+  [[nodiscard]] const PartSurfaces& surfaces() const { return cut_->surfaces(); }
   [[nodiscard]] const Prediction& prediction() const { return prediction_; }
 
  private:
   Lens lens_;
   CamOptions options_;
   Executor executor_ = Executor::cpu(2);
-  CutPlan plan_;
-  FacetField cut_;
-  FacetField designed_;
-  std::shared_ptr<const DropCutter> cutter_;
-  std::optional<RoundedField> rounded_;
-  std::optional<PartSurfaces> surfaces_;
+  CutSetup setup_;
+  CutPasses passes_;
+  std::optional<CutSurfaces> cut_;
   Prediction prediction_;
 };
 
@@ -125,8 +119,9 @@ TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   const CamOptions options = facets_polished();
   const Predicted cut(grooved_lens(), options);
   const FieldRenderSetup setup{
-      cut.site().lens.setup,
-      sampled_grid({3.0, 2.0}, sample_spacings(options, cut.site().lens.setup))};
+      cut.site().setup.lens->setup,
+      sampled_grid({3.0, 2.0}, sample_spacings(options, cut.site().setup.lens->setup,
+                                               cut.site().setup.passes()))};
   LeakPlace place = cut.prediction().places[0];
   const auto coarser = std::llround(setup.grid.spacing.x() / setup.grid.spacing.y());
   place.cells = {120 / coarser, 70, 60 / coarser, 40};

@@ -6,6 +6,7 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
+#include "cam/plan/finishing.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
@@ -51,7 +52,8 @@ class Pitches : public ::testing::TestWithParam<double> {};
 TEST_P(Pitches, HalfTheSpacingPredictsTheSame) {
   CamOptions options = with_pitch(GetParam());
   const ReportData as_is = cut(options);
-  options.sample_spacing = 0.5 * sample_spacing(options);
+  const FinishGround ground = unknown_ground(options, gentle_lens().setup);
+  options.sample_spacing = 0.5 * sample_spacing(options, passes_on_lens(options, ground));
   const ReportData finer = cut(options);
   const PictureQuality& a = as_is.leakage.part().quality;
   const PictureQuality& b = finer.leakage.part().quality;

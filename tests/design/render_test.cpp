@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/metrics.h"
-#include "core/image/spectral_color.h"
-#include "core/optics/light_colors.h"
-#include "core/surface/mesh_normals.h"
+#include "core/image/color.h"
+#include "core/image/image.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/optical_setup.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 #include "design/ray_tracer.h"

@@ -279,10 +279,10 @@ TEST(FinishRaster, EveryRowIsReportedByTheCallersThread) {
 TEST(FinishRaster, PitchForAScallopLeavesThatScallopOnSlopes) {
   FinishProcess process;
   process.scallop = 0.002;
-  const double pitch = finish_pitch(process, kRadius);
+  const double pitch = max_pitch(process, kRadius, 0.0);
   EXPECT_NEAR(kRadius - std::sqrt(kRadius * kRadius - 0.25 * pitch * pitch), 0.002, 1e-15);
   // On a slope of 1 the distance along the surface is √2 times that of the rows.
-  EXPECT_NEAR(pitch_on_slope(pitch, 1.0) * std::sqrt(2.0), pitch, 1e-15);
+  EXPECT_NEAR(max_pitch(process, kRadius, 1.0) * std::sqrt(2.0), pitch, 1e-15);
 }
 
 TEST(FinishRaster, DecimalsFollowFromTheTolerances) {

@@ -113,7 +113,7 @@ TEST(Workshop, DefaultsAreThePapersMachineToolAndAcrylic) {
   EXPECT_EQ(ball.shape, CutterShape::kBall);
   EXPECT_EQ(ball.diameter, 0.4);
   EXPECT_EQ(ball.spindle_rpm, 23000.0);
-  EXPECT_EQ(finish_pitch(shop.process.finish, ball.radius()), 0.06);
+  EXPECT_EQ(max_pitch(shop.process.finish, ball.radius(), 0.0), 0.06);
   EXPECT_EQ(shop.material.ior, 0.0) << "not stated";
   EXPECT_NO_THROW(validate(shop, "defaults"));
 }
@@ -121,7 +121,7 @@ TEST(Workshop, DefaultsAreThePapersMachineToolAndAcrylic) {
 TEST(Workshop, PitchFollowsFromTheScallop) {
   FinishProcess finish;
   finish.scallop = 0.00225;  // Of a ball of 0.2 mm at 0.06 mm: 0.2 − √(0.2² − 0.03²) = 2.263 µm.
-  const double pitch = finish_pitch(finish, 0.2);
+  const double pitch = max_pitch(finish, 0.2, 0.0);
   EXPECT_NEAR(0.2 - std::sqrt(0.04 - 0.25 * pitch * pitch), finish.scallop, 1e-15);
   EXPECT_NEAR(pitch, 0.06, 3e-4);
 }

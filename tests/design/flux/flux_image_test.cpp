@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/optics/source_points.h"
+#include "core/optics/light_source.h"
 #include "design/clip_reference.h"
 #include "design/random_input.h"
 #include "design/random_triangles.h"

@@ -10,9 +10,10 @@
 #include <vector>
 
 #include "core/lens/smooth_surface.h"
+#include "core/lens/surface_check.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/spline/control_net.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/sample_splines.h"
 #include "design/graded_mesh.h"
 #include "design/random_input.h"
 #include "design/schedule/rounds.h"

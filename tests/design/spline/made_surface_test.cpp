@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/surface/cubic_spline.h"
-#include "core/surface/sample_splines.h"
+#include "core/spline/cubic_spline.h"
+#include "core/spline/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 
