@@ -17,6 +17,7 @@
 #include "core/lens/smooth_surface.h"
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
+#include "core/schema/description.h"
 #include "core/text/lower_case.h"
 #include "core/text/version.h"
 #include "design/render.h"
@@ -30,20 +31,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Words = Row<ExportOptions>::Choices<ExportFormat>;
-
-const Words& formats() {
+const Choices<ExportFormat>& formats() {
   using F = ExportFormat;
-  static const Words words{{"extension", F::kByExtension},
-                           {"step", F::kStep},
-                           {"iges", F::kIges},
-                           {"stl", F::kStl},
-                           {"obj", F::kObj},
-                           {"ply", F::kPly},
-                           {"3mf", F::k3mf},
-                           {"glb", F::kGlb},
-                           {"exr", F::kExr},
-                           {"png", F::kPng}};
+  static const Choices<ExportFormat> words{{"extension", F::kByExtension},
+                                           {"step", F::kStep},
+                                           {"iges", F::kIges},
+                                           {"stl", F::kStl},
+                                           {"obj", F::kObj},
+                                           {"ply", F::kPly},
+                                           {"3mf", F::k3mf},
+                                           {"glb", F::kGlb},
+                                           {"exr", F::kExr},
+                                           {"png", F::kPng}};
   return words;
 }
 
@@ -63,30 +62,22 @@ void require_author(const std::string& author) {
 
 }  // namespace
 
-const OptionTable<ExportOptions>& export_fields() {
-  using O = ExportOptions;
-  using R = Row<O>;
-  static const OptionTable<O> table{
-      R::flag("--force", &O::force, "replace a file that lensforge did not write"),
-      R::word<ExportFormat>(
-          "--format", &O::format, formats(),
-          "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; clear part for "
-          "scenes as glb; height map as exr (32-bit, mm) or png (16-bit grey)"),
-      R::whole("--pixels", &O::pixels, Limits::between(2, kMaxImageSide),
-               "longer side of a height map"),
-      R::length("--tolerance", &O::tolerance, Limits::between(1e-6, 1.0),
-                "step, iges: largest distance of the splines from the smooth surface"),
-      R::number("--normal-tolerance", &O::normal_tolerance, Limits::between(1e-6, 0.1), "rad",
-                "step, iges: largest angle to the normals of the vertex-normal model"),
-      R::whole(
-          "--max-points", &O::max_points, Limits::between(0, 1e7),
+void describe(Description& d, ExportOptions& o) {
+  d.flag("--force", o.force, "replace a file that lensforge did not write");
+  d.word("--format", o.format, formats(),
+         "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; clear part for "
+         "scenes as glb; height map as exr (32-bit, mm) or png (16-bit grey)");
+  d.whole("--pixels", o.pixels, Limits::between(2, kMaxImageSide), "longer side of a height map");
+  d.length("--tolerance", o.tolerance, Limits::between(1e-6, 1.0),
+           "step, iges: largest distance of the splines from the smooth surface");
+  d.number("--normal-tolerance", o.normal_tolerance, Limits::between(1e-6, 0.1), "rad",
+           "step, iges: largest angle to the normals of the vertex-normal model");
+  d.whole("--max-points", o.max_points, Limits::between(0, 1e7),
           "step, iges: maximum number of control points, about 72 bytes each; 0: four a vertex, "
-          "575000 at most"),
-      R::word<StepSchema>("--schema", &O::schema,
-                          {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
-                          "step: application protocol"),
-      R::text("--author", &O::author, "NAME", "step, iges: author in the header; printable ASCII")};
-  return table;
+          "575000 at most");
+  d.word("--schema", o.schema, {{"ap214", StepSchema::kAp214}, {"ap242", StepSchema::kAp242}},
+         "step: application protocol");
+  d.text("--author", o.author, "NAME", "step, iges: author in the header; printable ASCII");
 }
 
 std::string word_of(ExportFormat format) {
@@ -120,7 +111,7 @@ ExportFormat export_format(const ExportOptions& options, const fs::path& out) {
 }
 
 void validate(const ExportOptions& options, const fs::path& out) {
-  require_limits(export_fields(), options);
+  require_limits(options);
   require_author(options.author);
   export_format(options, out);
   if (is_folder(out)) throw InputError("--out " + out.string() + ": is a folder, not a file");

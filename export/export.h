@@ -11,12 +11,14 @@
 #include "core/compute/work_estimate.h"
 #include "core/image/image.h"
 #include "core/lens/lens.h"
-#include "core/text/option_field.h"
+#include "core/schema/description.h"
 #include "export/files/height_map.h"
 #include "export/solid/step_file.h"
 #include "export/spline/spline_fit.h"
 
 namespace lensforge {
+
+class Description;
 
 /// File formats of an export.
 enum class ExportFormat { kByExtension, kStep, kIges, kStl, kObj, kPly, k3mf, kGlb, kExr, kPng };
@@ -35,7 +37,7 @@ struct ExportOptions {
 };
 
 /// Every option of an export.
-const OptionTable<ExportOptions>& export_fields();
+void describe(Description& d, ExportOptions& o);
 
 /// "step", "iges", "stl", "obj", "ply", "3mf", "glb", "exr" or "png".
 std::string word_of(ExportFormat format);

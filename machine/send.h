@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/text/option_field.h"
 #include "machine/guard/register_map.h"
 #include "machine/stream/controller_dialogue.h"
 #include "machine/stream/program_facts.h"
@@ -17,6 +16,8 @@
 #include "machine/stream/sender.h"
 
 namespace lensforge {
+
+class Description;
 
 /// Options for sending a program to a machine.
 struct SendOptions {
@@ -46,7 +47,7 @@ struct SendOptions {
 };
 
 /// Every option of a job.
-const OptionTable<SendOptions>& send_fields();
+void describe(Description& d, SendOptions& o);
 
 /// @throw InputError for an option that breaks its rule, and for those that exclude each other or
 ///        are missing.

@@ -12,8 +12,8 @@
 #include "app/frame/option_set.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/text/json_fields.h"
-#include "core/text/json_text.h"
+#include "core/schema/json.h"
+#include "core/schema/option_text.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::app {
@@ -60,15 +60,15 @@ bool is_for_batch(const std::string& option) {
   return reserved.contains(option);
 }
 
-using OptionSpecs = std::map<std::string, OptionSpec>;
+using FieldSpecs = std::map<std::string, FieldSpec>;
 
 /// The options of a command by their names without dashes.
-OptionSpecs listed_specs(const JobCommand& command) {
-  OptionSpecs specs;
+FieldSpecs listed_specs(const JobCommand& command) {
+  FieldSpecs specs;
   try {
     command.run({kListOptions});
   } catch (const ListedOptions& listed) {
-    for (const OptionSpec& spec : listed.options) {
+    for (const FieldSpec& spec : listed.options) {
       if (spec.name.starts_with("--")) specs[spec.name.substr(2)] = spec;
     }
   }
@@ -76,9 +76,9 @@ OptionSpecs listed_specs(const JobCommand& command) {
 }
 
 /// Those of all commands are listed at once: jobs ask from several threads.
-const OptionSpecs& specs_of(const std::string& command) {
-  static const std::map<std::string_view, OptionSpecs> known = [] {
-    std::map<std::string_view, OptionSpecs> all;
+const FieldSpecs& specs_of(const std::string& command) {
+  static const std::map<std::string_view, FieldSpecs> known = [] {
+    std::map<std::string_view, FieldSpecs> all;
     for (const JobCommand& each : kCommands) all[each.name] = listed_specs(each);
     return all;
   }();
@@ -90,10 +90,10 @@ std::string word_of(const json& value) {
 }
 
 /// @throw InputError unless the option can have this value.
-void require_value(const OptionSpec& spec, const json& value) {
+void require_value(const FieldSpec& spec, const json& value) {
   const auto is_word = [](const json& v) { return v.is_string() || v.is_number(); };
-  const bool flag = spec.kind == OptionKind::kFlag;
-  const bool list = value.is_array() && spec.kind == OptionKind::kText;
+  const bool flag = spec.kind == FieldKind::kFlag;
+  const bool list = value.is_array() && spec.kind == FieldKind::kText;
   const bool fits = flag   ? value.is_boolean()
                     : list ? std::all_of(value.begin(), value.end(), is_word)
                            : is_word(value);
@@ -103,7 +103,7 @@ void require_value(const OptionSpec& spec, const json& value) {
                            : "a text or a number, or a list of them where the option takes several "
                              "words; --grid makes a job of each of several values"));
   }
-  if (!flag && !list) option_value(spec, word_of(value));
+  if (!flag && !list) value_of(spec, word_of(value));
 }
 
 /// Reads one line.

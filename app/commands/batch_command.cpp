@@ -36,13 +36,6 @@ struct BatchSettings {
 
 constexpr int kMaxParallel = 1024;
 
-const OptionTable<BatchSettings>& batch_fields() {
-  static const OptionTable<BatchSettings> fields{Row<BatchSettings>::whole(
-      "--parallel", &BatchSettings::parallel, Limits::between(1, kMaxParallel),
-      "jobs at the same time; they share --threads")};
-  return fields;
-}
-
 void add_batch_options(OptionSet& options, BatchSettings& settings) {
   options.positional(
       "JOBS", settings.jobs_file,
@@ -53,7 +46,10 @@ void add_batch_options(OptionSet& options, BatchSettings& settings) {
   options.text("--shard", settings.shard, "I/N", "of every N jobs only the I-th, I from 1 to N");
   options.texts("--grid", settings.grid, "OPTION=VALUES",
                 "every job with every combination of these: focal=250,300 cam.pitch=0.05,0.06");
-  options.fields(batch_fields(), settings);
+  Description d;
+  d.whole("--parallel", settings.parallel, Limits::between(1, kMaxParallel),
+          "jobs at the same time; they share --threads");
+  options.add(d);
   options.text("--table", settings.table, "FILE.csv",
                "write all jobs' options and results into a table");
   options.flag(

@@ -21,7 +21,8 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/text/toml_fields.h"
+#include "core/schema/description.h"
+#include "core/schema/toml_document.h"
 
 namespace lensforge::app {
 
@@ -43,7 +44,7 @@ void add_cam_options(OptionSet& options, CamSettings& settings) {
       "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
       "pitch=0.04,0.06 slope=3e-5,6e-5 large=0,4 (finishing only); mae=0.004 recommends the "
       "quickest that reaches it");
-  options.fields(cam_fields(), settings.cam);
+  options.fields(settings.cam);
 }
 
 void take_workshop(OptionSet& options, const std::string& file, CamOptions& cam) {

@@ -11,8 +11,9 @@
 #include "cam/coupon/coupon_fit.h"
 #include "cam/coupon/coupon_job.h"
 #include "core/error.h"
+#include "core/schema/description.h"
+#include "core/schema/toml.h"
 #include "core/text/number_text.h"
-#include "core/text/toml_fields.h"
 
 namespace lensforge::app {
 
@@ -27,7 +28,7 @@ void add_coupon_options(OptionSet& options, CouponSettings& settings) {
   options.text("--workshop", settings.workshop, "FILE.toml",
                "the workshop that cuts the coupon; the fitted one differs from it in these values "
                "only");
-  options.fields(coupon_fields(), settings.coupon);
+  options.fields(settings.coupon);
 }
 
 void settle(const OptionSet& options, CouponSettings& settings) {
@@ -36,7 +37,7 @@ void settle(const OptionSet& options, CouponSettings& settings) {
     settings.coupon.workshop = parse_workshop(settings.workshop_text, settings.workshop);
   }
   if (settings.fit.empty()) return;
-  for (const OptionField<CouponOptions>& row : coupon_fields()) {
+  for (const Field& row : description_of(settings.coupon)) {
     if (row.name != "--force" && options.given(row.name)) {
       throw InputError(row.name + ": is for making a coupon, not for --fit");
     }

@@ -42,8 +42,8 @@
 #include "core/optics/light_source.h"
 #include "core/page/drawings.h"
 #include "core/page/html_page.h"
+#include "core/schema/json.h"
 #include "core/spline/control_net.h"
-#include "core/text/json_text.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
 #include "design/design.h"
@@ -57,16 +57,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The rows of `cam` that determine the milled part.
-const OptionTable<CamOptions>& part_fields() {
-  static const OptionTable<CamOptions> fields = [] {
-    OptionTable<CamOptions> rows;
-    for (const auto& row : cam_fields()) {
-      if (row.name == "--part" || row.name == "--shrinkage") rows.push_back(row);
-    }
-    return rows;
-  }();
-  return fields;
+/// The options of `cam` that determine the milled part.
+Description part_options(CamOptions& cut) {
+  return description_of(cut).only({"--part", "--shrinkage"});
 }
 
 /// The slopes that a scallop's pitch depends on are not known before the design; cam warns if they
@@ -84,13 +77,13 @@ MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
 }
 
 /// @throw InputError unless nothing is said of how a part is made.
-void refuse_part_options(const OptionSet& options) {
+void refuse_part_options(const OptionSet& options, CamOptions& cut) {
   if (options.given("--robust")) {
     throw InputError("--robust: needs --made-by, which says how the part is made");
   }
-  for (const auto& row : part_fields()) {
-    if (options.given(row.name)) {
-      throw InputError(row.name + ": needs --made-by, which says how the part is made");
+  for (const Field& field : part_options(cut)) {
+    if (options.given(field.name)) {
+      throw InputError(field.name + ": needs --made-by, which says how the part is made");
     }
   }
 }
@@ -122,8 +115,8 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
   options.positional("TARGET", settings.target,
                      "picture to project: PNG, JPEG, TIFF, EXR, SVG, ...");
   options.required_text("--out", settings.out, "DIR", "lens folder to write");
-  options.fields(design_fields(), settings.design);
-  options.fields(light_fields(), settings.design.light);
+  options.fields(settings.design);
+  options.fields(settings.design.light);
   options.text("--source-picture", settings.source_picture, "FILE",
                "picture of the lamp as seen from the lens, as wide as --source-angle or "
                "--source-size; without it the lamp is an evenly lit disc");
@@ -131,14 +124,14 @@ void add_design_options(OptionSet& options, DesignSettings& settings) {
       "--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
       "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
       "in a picture, seen from the cutter's side");
-  options.fields(background_fields(), settings.background);
-  options.fields(weight_fields(), settings.design.weights);
+  options.fields(settings.background);
+  options.fields(settings.design.weights);
   options.text("--made-by", settings.made_by, "default|FILE.toml",
                "shape the part that this workshop cuts and polishes, not the surface alone");
   options.flag("--robust", settings.robust,
                "with --made-by: right on average over parts that are polished less and more by the "
                "workshop's tolerances.polish_sigma; takes twice as long");
-  options.fields(part_fields(), settings.cut);
+  options.add(part_options(settings.cut));
   options.text("--live", settings.live, "PORT",
                "serve a page that shows the design while it runs, to browsers on this machine; 0 "
                "takes a free port");
@@ -169,7 +162,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
   }
   Workshop workshop;
   if (settings.made_by.empty()) {
-    refuse_part_options(options);
+    refuse_part_options(options, settings.cut);
     if (!options.given("--model")) {
       const int pixels = std::min(settings.design.pixels, longer);
       settings.design.model =
@@ -482,14 +475,14 @@ void note_source(const Image& picture, const DesignOptions& design, const Consol
 nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
   nlohmann::json summary = {{"out", folder.string()},
-                            {"status", lens.provenance["status"]},
+                            {"status", lens.provenance.json()["status"]},
                             {"message", result.message},
                             {"pixels", {lens.setup.pixels.x(), lens.setup.pixels.y()}},
                             {"grid", {lens.surface.grid.columns, lens.surface.grid.rows}},
                             {"lens_size", {lens.setup.lens_size.x(), lens.setup.lens_size.y()}},
                             {"metrics", metrics_json(lens)},
                             {"iterations", result.convergence.size()},
-                            {"seconds", lens.provenance["seconds"]}};
+                            {"seconds", lens.provenance.json()["seconds"]}};
   if (result.source) summary["source_check"] = source_json(*result.source);
   if (result.colors) summary["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) summary["made"] = metrics_json(result.made->metrics);
@@ -504,7 +497,7 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") + "  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +
-         fixed(lens.provenance["seconds"].get<double>(), 1) + " s\n";
+         fixed(lens.provenance.json()["seconds"].get<double>(), 1) + " s\n";
 }
 
 /// Saves the result. An earlier lens of another design stays until this one is done.

@@ -141,15 +141,6 @@ CommandResult export_report(const ExportResult& result) {
 
 namespace {
 
-/// Options that reach the library through its source.
-const OptionTable<ExportSettings>& source_fields() {
-  static const OptionTable<ExportSettings> table{Row<ExportSettings>::word<ExportSurface>(
-      "--surface", &ExportSettings::surface,
-      {{"designed", ExportSurface::kDesigned}, {"milled", ExportSurface::kMilled}},
-      "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply")};
-  return table;
-}
-
 /// Remedy if splines miss a mesh's tolerances. More control points do not help if no surface has
 /// all its normals.
 std::string remedy_for(const SplineSolid& solid, ExportSurface surface) {
@@ -167,8 +158,12 @@ std::string remedy_for(const SplineSolid& solid, ExportSurface surface) {
 void add_export_options(OptionSet& options, ExportSettings& settings) {
   options.positional("DIR", settings.source, "lens folder");
   options.required_text("--out", settings.out, "FILE", "file to write; its folder is created");
-  options.fields(source_fields(), settings);
-  options.fields(export_fields(), settings.options);
+  Description source;
+  source.word("--surface", settings.surface,
+              {{"designed", ExportSurface::kDesigned}, {"milled", ExportSurface::kMilled}},
+              "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply");
+  options.add(source);
+  options.fields(settings.options);
 }
 
 void require_fitting_options(const OptionSet& options, ExportFormat format) {

@@ -265,7 +265,7 @@ Description describe_lens(const fs::path& folder) {
     d.line(model_name(model), metrics_text(metrics));
   if (lens.source_limit) d.line("limit", metrics_text(*lens.source_limit) + "  of the source");
   d.json["metrics"] = metrics_json(lens);
-  describe_provenance(d, lens.provenance);
+  describe_provenance(d, lens.provenance.json());
   return d;
 }
 
@@ -377,7 +377,7 @@ struct InfoSettings {
 void add_info_options(OptionSet& options, InfoSettings& settings) {
   options.positional("SOURCE", settings.source,
                      "lens folder, solid, mesh, picture or G-code program");
-  options.fields(background_fields(), settings.background);
+  options.fields(settings.background);
 }
 
 CommandResult run(CommandFrame& frame, InfoSettings& settings) {

@@ -31,14 +31,13 @@ constexpr const char* kBlank = "--blank";
 /// A gap beyond it is none, mm.
 constexpr double kWidestGap = 1000.0;
 
-nlohmann::json blank_text(const NestOptions& options) {
+std::string blank_text(const NestOptions& options) {
   std::vector<double> numbers(options.blank.data(), options.blank.data() + 2);
   if (options.thickness) numbers.push_back(*options.thickness);
   return options.blank.isZero() ? "" : numbers_text(numbers);
 }
 
-void set_blank(NestOptions& options, const nlohmann::json& value) {
-  const auto text = value.get<std::string>();
+void set_blank(NestOptions& options, const std::string& text) {
   const auto commas = std::count(text.begin(), text.end(), ',');
   const std::vector<double> numbers = parse_numbers(text, kBlank, commas == 2 ? 3 : 2);
   options.blank = {numbers[0], numbers[1]};
@@ -46,23 +45,18 @@ void set_blank(NestOptions& options, const nlohmann::json& value) {
   if (numbers.size() > 2) options.thickness = numbers[2];
 }
 
-const OptionTable<NestOptions>& nest_fields() {
-  using R = Row<NestOptions>;
-  static const OptionTable<NestOptions> table{
-      {{kBlank,
-        OptionKind::kText,
-        "width and height of the common blank, and its thickness where it is more than the highest "
-        "lens needs, mm",
-        {},
-        "W,H[,T]",
-        {}},
-       blank_text,
-       set_blank,
-       blank_text,
-       {}},
-      R::length("--gap", &NestOptions::gap, Limits::between(0, kWidestGap),
-                "between lenses, at least; 0: the least that the tools need")};
-  return table;
+Description describe_sheet(NestOptions& options) {
+  Description d;
+  d.text(
+      {.name = kBlank,
+       .help = "width and height of the common blank, and its thickness where it is more than "
+               "the highest lens needs, mm",
+       .unit = "W,H[,T]"},
+      [&options] { return blank_text(options); },
+      [&options](const std::string& text) { set_blank(options, text); });
+  d.length("--gap", options.gap, Limits::between(0, kWidestGap),
+           "between lenses, at least; 0: the least that the tools need");
+  return d;
 }
 
 }  // namespace
@@ -71,10 +65,10 @@ void add_nest_options(OptionSet& options, NestSettings& settings) {
   options.texts("DIR", settings.sources, "", "lens folders; one named twice is cut twice");
   options.required_text("--out", settings.out, "DIR",
                         "folder for programs, layout and a folder of reports of each lens");
-  options.fields(nest_fields(), settings.nest);
+  options.add(describe_sheet(settings.nest));
   options.text("--workshop", settings.workshop, "FILE.toml",
                "machine, blank, clamps, tools and process; options given here win");
-  options.fields(cam_fields(), settings.nest.cam);
+  options.fields(settings.nest.cam);
 }
 
 void settle(OptionSet& options, NestSettings& settings) {

@@ -28,7 +28,7 @@ void add_reflect_options(OptionSet& options, ReflectSettings& settings) {
                "print the reflected energies of the mesh as it is and write nothing");
   options.flag("--resume", settings.resume,
                "continue the interrupted run in --out, with the same mesh and options");
-  options.fields(reflect::reflect_fields(), settings.reflect);
+  options.fields(settings.reflect);
 }
 
 namespace {

@@ -52,8 +52,8 @@ void add_render_options(OptionSet& options, RenderArguments& arguments) {
   options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
   options.flag("--force", arguments.force, "replace a file that lensforge did not write");
   options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
-  options.fields(background_fields(), arguments.background);
-  options.fields(render_fields(), arguments.render);
+  options.fields(arguments.background);
+  options.fields(arguments.render);
 }
 
 Scene load_solid(const std::string& source, CommandFrame& frame) {

@@ -28,7 +28,7 @@ namespace lensforge::app {
 
 void add_send_options(OptionSet& options, SendSettings& settings) {
   options.positional("FILE", settings.file, "G-code program");
-  options.fields(send_fields(), settings.job);
+  options.fields(settings.job);
   options.flag("--yes", settings.yes, "do not ask before resuming");
   options.text("--log", settings.log, "FILE",
                "log file, appended to an earlier one; default FILE.ngc.log");

@@ -20,7 +20,7 @@
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/error.h"
-#include "core/text/option_field.h"
+#include "core/schema/description.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
 #include "design/mpi/session.h"
@@ -53,7 +53,7 @@ namespace {
 struct CompletedCommand {
   std::string name;
   std::string summary;
-  std::vector<OptionSpec> options;
+  std::vector<FieldSpec> options;
 };
 
 /// Possible values of an option, for completion.
@@ -81,23 +81,23 @@ Value value_of_text(const std::string& type) {
   return value;
 }
 
-Value value_of(const OptionSpec& spec) {
+Value value_of(const FieldSpec& spec) {
   switch (spec.kind) {
-    case OptionKind::kFlag:
+    case FieldKind::kFlag:
       return {Value::Kind::kNone, {}, {}};
-    case OptionKind::kWord:
+    case FieldKind::kWord:
       return {Value::Kind::kWords, spec.words, {}};
-    case OptionKind::kText:
+    case FieldKind::kText:
       return value_of_text(spec.unit);
     default:
       return {};
   }
 }
 
-bool is_option(const OptionSpec& spec) { return spec.name.starts_with("--"); }
+bool is_option(const FieldSpec& spec) { return spec.name.starts_with("--"); }
 
 /// A help's first clause.
-std::string short_help(const OptionSpec& spec) { return spec.help.substr(0, spec.help.find(';')); }
+std::string short_help(const FieldSpec& spec) { return spec.help.substr(0, spec.help.find(';')); }
 
 /// Quotes a text in single quotes, valid in all three shells. @param escaped  characters that get a
 /// backslash.
@@ -167,7 +167,7 @@ std::string bash_script(const std::vector<CompletedCommand>& commands) {
   std::string lists;
   for (const CompletedCommand& command : commands) {
     std::vector<std::string> names;
-    for (const OptionSpec& spec : command.options) {
+    for (const FieldSpec& spec : command.options) {
       if (!is_option(spec)) continue;
       names.push_back(spec.name);
       const Value value = value_of(spec);
@@ -202,7 +202,7 @@ std::string zsh_value(const Value& value) {
   }
 }
 
-std::string zsh_argument(const OptionSpec& spec) {
+std::string zsh_argument(const FieldSpec& spec) {
   const Value value = value_of(spec);
   const bool flag = value.kind == Value::Kind::kNone;
   const std::string help = quoted(short_help(spec), "[]:\\");
@@ -222,7 +222,7 @@ std::string zsh_script(const std::vector<CompletedCommand>& commands) {
       "  local command=$words[2]\n  shift words\n  ((CURRENT--))\n  case $command in\n";
   for (const CompletedCommand& command : commands) {
     text += "    " + command.name + ")\n      _arguments \\\n";
-    for (const OptionSpec& spec : command.options) {
+    for (const FieldSpec& spec : command.options) {
       if (is_option(spec)) text += "        " + zsh_argument(spec) + " \\\n";
     }
     text += "        '*:file:_files'\n      ;;\n";
@@ -259,7 +259,7 @@ std::string fish_script(const std::vector<CompletedCommand>& commands) {
             quoted(command.summary, "\\") + "\n";
   }
   for (const CompletedCommand& command : commands) {
-    for (const OptionSpec& spec : command.options) {
+    for (const FieldSpec& spec : command.options) {
       if (!is_option(spec)) continue;
       text += "complete -c lensforge -n '__fish_seen_subcommand_from " + command.name + "' -l " +
               spec.name.substr(2) + fish_value(value_of(spec)) + " -d " +

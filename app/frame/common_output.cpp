@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "app/frame/console.h"
 
@@ -83,7 +84,7 @@ std::string seal_words(const std::optional<bool>& holds) {
 }
 
 void note_unfinished_design(const Lens& lens, const Console& console) {
-  const auto& about = lens.provenance;
+  const auto& about = lens.provenance.json();
   if (!about.is_object() || about.value("status", nlohmann::json()) != "interrupted") return;
   console.note("note: the lens's design was interrupted; finish it with design --resume");
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/frame/option_set.h"
 
-#include <toml++/toml.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
@@ -11,6 +9,7 @@
 #include <deque>
 #include <exception>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,9 +17,12 @@
 #include "core/compute/executor.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/schema/json.h"
+#include "core/schema/option_text.h"
+#include "core/schema/toml.h"
+#include "core/schema/toml_document.h"
 #include "core/text/number_text.h"
 #include "core/text/printable.h"
-#include "core/text/toml_fields.h"
 #include "core/text/units.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
@@ -58,7 +60,7 @@ std::string flag_value(const std::string& name, const std::string& value) {
   throw InputError(name + " " + printable_line(value, kLongestKey) + ": must be true or false");
 }
 
-std::string value_text(const std::string& key, const toml::node& value) {
+std::string config_text(const std::string& key, const toml::node& value) {
   if (const auto* text = value.as_string()) return text->get();
   if (const auto* flag = value.as_boolean()) return flag->get() ? "true" : "false";
   if (!value.is_number()) {
@@ -93,7 +95,7 @@ std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& input) const 
       throw InputError("--config: key " + printable_line(item.name, kLongestKey) +
                        ": unknown option of this command");
     }
-    item.inputs = {value_text(item.name, value)};
+    item.inputs = {config_text(item.name, value)};
     read.push_back(std::move(item));
   }
   return read;
@@ -112,57 +114,11 @@ bool config_asks_for_json(const std::filesystem::path& file) noexcept {
 
 namespace {
 
+using Words = std::vector<std::string>;
+
 constexpr const char* kCommonGroup = "Common options";
 constexpr double kMaxThreads = 1024;
 constexpr std::size_t kHelpColumn = 34;
-
-template <class Value>
-Value parsed(const std::string& name, const std::string& text, const char* kind) {
-  Value value{};
-  const char* end = text.data() + text.size();
-  const auto [stopped, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || stopped != end) {
-    throw InputError(name + " " + text + ": must be " + kind);
-  }
-  return value;
-}
-
-/// A value's placeholder in the help: "MM", "a|b".
-std::string type_of(const OptionSpec& spec) {
-  switch (spec.kind) {
-    case OptionKind::kWhole:
-      return "N";
-    case OptionKind::kNumber:
-      return "NUMBER";
-    case OptionKind::kLength:
-      return "MM";
-    case OptionKind::kWord:
-      return joined(spec.words, "|");
-    case OptionKind::kText:
-      return spec.unit;
-    case OptionKind::kFlag:
-      break;
-  }
-  return {};
-}
-
-/// The help with unit and limits.
-std::string help_of(const OptionSpec& spec) {
-  if (!spec.is_number()) return spec.help;
-  return spec.help + "; " + (spec.unit.empty() ? "" : spec.unit + ", ") + spec.limits.rule();
-}
-
-std::string default_text(const nlohmann::json& value) {
-  if (value.is_string()) return value.get<std::string>();
-  return value.is_number_float() ? number_text(value.get<double>()) : value.dump();
-}
-
-/// Text for a manual page: no character begins a request or an escape.
-std::string manual_text(const std::string& text) {
-  std::string safe;
-  for (const char c : text) safe += c == '\\' ? std::string("\\e") : std::string(1, c);
-  return safe.starts_with('.') || safe.starts_with('\'') ? "\\&" + safe : safe;
-}
 
 /// --help with one option a line, its default and its limits.
 class Formatter : public CLI::Formatter {
@@ -190,55 +146,27 @@ class Formatter : public CLI::Formatter {
   }
 };
 
-const OptionTable<CommonOptions>& common_fields() {
-  using R = Row<CommonOptions>;
-  static const OptionTable<CommonOptions> table{
-      R::flag("--json", &CommonOptions::json,
-              "print one JSON object with the result, nothing else, on stdout"),
-      R::flag("--quiet", &CommonOptions::quiet,
-              "no progress and no messages on stderr, errors excepted"),
-      R::whole("--threads", &CommonOptions::threads, Limits::between(0, kMaxThreads),
-               "threads to use, 0 for all; never changes a result"),
-      R::word<std::string>("--device", &CommonOptions::device,
-                           {{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}},
-                           "where to optimise and render; auto: a GPU if there is one")};
-  return table;
+Description describe_common(CommonOptions& o) {
+  Description d;
+  d.flag("--json", o.json, "print one JSON object with the result, nothing else, on stdout");
+  d.flag("--quiet", o.quiet, "no progress and no messages on stderr, errors excepted");
+  d.whole("--threads", o.threads, Limits::between(0, kMaxThreads),
+          "threads to use, 0 for all; never changes a result");
+  d.word("--device", o.device, {{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}},
+         "where to optimise and render; auto: a GPU if there is one");
+  return d;
 }
 
 }  // namespace
 
-nlohmann::json option_value(const OptionSpec& spec, const std::string& text) {
-  const auto checked = [&](auto value) {
-    spec.require(text, static_cast<double>(value));
-    return nlohmann::json(value);
-  };
-  switch (spec.kind) {
-    case OptionKind::kWhole:
-      return checked(parsed<int>(spec.name, text, "a whole number"));
-    case OptionKind::kNumber:
-      return checked(parsed<double>(spec.name, text, "a number"));
-    case OptionKind::kLength:
-      return checked(parse_length_mm(text, spec.name));
-    case OptionKind::kWord:
-      spec.require_word(text);
-      return text;
-    case OptionKind::kText:
-      if (text.empty()) throw InputError(spec.name + ": must not be empty");
-      return text;
-    case OptionKind::kFlag:
-      break;
-  }
-  return text == "true";
-}
-
 std::string version_line() { return program_mark() + "\n"; }
 
-/// An option with its value as it was given, null until then.
+/// An option with its value as it was given, none until then.
 struct BoundOption {
-  OptionSpec spec;
-  std::function<nlohmann::json()> get;
-  std::function<void(const nlohmann::json&)> set;
-  nlohmann::json given = nullptr;
+  Field field;
+  FieldValue given;
+
+  [[nodiscard]] bool is_given() const { return !std::holds_alternative<std::monostate>(given); }
 };
 
 struct OptionSet::Parser {
@@ -257,69 +185,76 @@ OptionSet::OptionSet(const std::string& command, const std::string& description)
 
 OptionSet::~OptionSet() = default;
 
-void OptionSet::add(const OptionSpec& spec, Getter get, Setter set) {
-  BoundOption& option =
-      parser_->options.emplace_back(BoundOption{spec, std::move(get), std::move(set)});
+void OptionSet::add(const Description& description) {
+  for (const Field& field : description) bind(field);
+}
+
+void OptionSet::bind(const Field& field) {
+  BoundOption& option = parser_->options.emplace_back(BoundOption{field, {}});
   CLI::App& app = parser_->app;
-  if (spec.kind == OptionKind::kFlag) {
+  const FieldValue initial = field.get();
+  if (field.kind == FieldKind::kFlag) {
     const auto count = [&option](std::int64_t times) { option.given = times > 0; };
     // Anything else that a --config file or --flag=value gives CLI11 tries to read as a number.
-    const auto refuse_others = [name = spec.name](const std::string& value) {
+    const auto refuse_others = [name = field.name](const std::string& value) {
       flag_value(name, value);
       return std::string();
     };
-    app.add_flag_function(spec.name, count, spec.help)->check(refuse_others);
-    return;
+    app.add_flag_function(field.name, count, field.help)->check(refuse_others);
+  } else if (std::holds_alternative<Words>(initial)) {
+    const auto take = [&option](const Words& words) { option.given = words; };
+    app.add_option_function<Words>(field.name, take, field.help)->type_name(placeholder(field));
+  } else {
+    const auto take = [&option](const std::string& text) {
+      option.given = value_of(option.field, text);
+    };
+    app.add_option_function<std::string>(field.name, take, help_text(field))
+        ->type_name(placeholder(field))
+        ->default_str(value_text(initial));
   }
-  const auto take = [&option](const std::string& text) {
-    option.given = option_value(option.spec, text);
-  };
-  app.add_option_function<std::string>(spec.name, take, help_of(spec))
-      ->type_name(type_of(spec))
-      ->default_str(default_text(option.get()));
+  if (field.needed) app.get_option(field.name)->required();
 }
 
 void OptionSet::restate() {
   for (const BoundOption& option : parser_->options) {
-    if (!option.given.is_null()) option.set(option.given);
+    if (option.is_given()) option.field.set(option.given);
   }
 }
 
 void OptionSet::positional(const std::string& name, std::string& value, const std::string& help) {
-  text(name, value, "", help);
-  parser_->app.get_option(name)->required();
+  required_text(name, value, "", help);
 }
 
 void OptionSet::required_text(const std::string& name, std::string& value, const std::string& type,
                               const std::string& help) {
-  text(name, value, type, help);
-  parser_->app.get_option(name)->required();
+  Description d;
+  d.text(name, value, type, help).needed = true;
+  add(d);
 }
 
 void OptionSet::text(const std::string& name, std::string& value, const std::string& type,
                      const std::string& help) {
-  add(
-      {name, OptionKind::kText, help, {}, type, {}}, [&value] { return nlohmann::json(value); },
-      [&value](const nlohmann::json& given) { value = given; });
+  Description d;
+  d.text(name, value, type, help);
+  add(d);
 }
 
 void OptionSet::texts(const std::string& name, std::vector<std::string>& values,
                       const std::string& type, const std::string& help) {
-  parser_->app.add_option(name, values, help)->type_name(type);
-  parser_->options.push_back({{name, OptionKind::kText, help, {}, type, {}},
-                              [&values] { return nlohmann::json(values); },
-                              [](const nlohmann::json& /*set by the parser*/) {}});
+  Description d;
+  d.texts(name, values, type, help);
+  add(d);
 }
 
 void OptionSet::flag(const std::string& name, bool& value, const std::string& help) {
-  add(
-      {name, OptionKind::kFlag, help, {}, {}, {}}, [&value] { return nlohmann::json(value); },
-      [&value](const nlohmann::json& given) { value = given; });
+  Description d;
+  d.flag(name, value, help);
+  add(d);
 }
 
 void OptionSet::add_common() {
   parser_->own = parser_->options.size();
-  fields(common_fields(), common_);
+  add(describe_common(common_));
   CLI::App& app = parser_->app;
   app.set_config("--config", "", "read options from this TOML file; the command line wins")
       ->type_name("FILE.toml");
@@ -373,22 +308,22 @@ nlohmann::json OptionSet::used() const {
   nlohmann::json object = nlohmann::json::object();
   for (std::size_t i = 0; i < parser_->own; ++i) {
     const BoundOption& option = parser_->options[i];
-    const std::string& name = option.spec.name;
-    const bool as_given = option.spec.kind == OptionKind::kText && !option.given.is_null();
+    const std::string& name = option.field.name;
+    const bool as_given = option.field.kind == FieldKind::kText && option.is_given();
     object[name.substr(std::min(name.find_first_not_of('-'), name.size()))] =
-        as_given ? option.given : option.get();
+        json_of(as_given ? option.given : option.field.get());
   }
   return object;
 }
 
-std::vector<OptionSpec> OptionSet::listed() const {
-  std::vector<OptionSpec> specs;
-  for (const BoundOption& option : parser_->options) specs.push_back(option.spec);
-  for (const auto& [name, kind] : {std::pair{"--config", OptionKind::kText},
-                                   {"--help", OptionKind::kFlag},
-                                   {"--version", OptionKind::kFlag}}) {
+std::vector<FieldSpec> OptionSet::listed() const {
+  std::vector<FieldSpec> specs;
+  for (const BoundOption& option : parser_->options) specs.push_back(option.field);
+  for (const auto& [name, kind] : {std::pair{"--config", FieldKind::kText},
+                                   {"--help", FieldKind::kFlag},
+                                   {"--version", FieldKind::kFlag}}) {
     const CLI::Option& option = *parser_->app.get_option(name);
-    specs.push_back({name, kind, option.get_description(), {}, option.get_type_name(), {}});
+    specs.push_back({name, kind, option.get_description(), {}, option.get_type_name()});
   }
   return specs;
 }
@@ -396,15 +331,8 @@ std::vector<OptionSpec> OptionSet::listed() const {
 std::string OptionSet::manual() const {
   std::string text;
   for (std::size_t i = 0; i < parser_->own; ++i) {
-    const BoundOption& option = parser_->options[i];
-    const OptionSpec& spec = option.spec;
-    if (!spec.name.starts_with('-')) continue;
-    const std::string type = type_of(spec);
-    text += ".It Fl " + spec.name.substr(1) + (type.empty() ? "" : " Ar " + type) + "\n";
-    text += manual_text(help_of(spec)) + ".\n";
-    const std::string value = default_text(option.get());
-    const bool shown = spec.kind != OptionKind::kFlag && !value.empty() && value != "[]";
-    if (shown) text += "Default: " + value + ".\n";
+    const Field& field = parser_->options[i].field;
+    if (field.name.starts_with('-')) text += manual_item(field);
   }
   return text;
 }

@@ -2,16 +2,15 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "app/frame/command_line.h"
 #include "core/compute/executor.h"
-#include "core/text/option_field.h"
+#include "core/schema/description.h"
 
 namespace lensforge::app {
 
@@ -24,12 +23,9 @@ struct HelpText {
 /// Thrown for kListOptions, which shell completions use: the options of the command, including the
 /// common ones, and its positional arguments.
 struct ListedOptions {
-  std::vector<OptionSpec> options;
+  std::vector<FieldSpec> options;
 };
 inline constexpr const char* kListOptions = "--list-options";
-
-/// Converts a value to its option's type. @throw InputError naming option, value and rule.
-nlohmann::json option_value(const OptionSpec& spec, const std::string& text);
 
 /// "lensforge x.y.z" and a line break.
 std::string version_line();
@@ -67,16 +63,12 @@ class OptionSet {
              const std::string& help);
   void flag(const std::string& name, bool& value, const std::string& help);
 
-  /// Adds an option for every row of a table. @param options  receives the values; it and the table
-  /// must outlive the set.
+  /// Adds an option for every field. @param options  receives the values; must outlive the set.
   template <class Options>
-  void fields(const OptionTable<Options>& table, Options& options) {
-    for (const OptionField<Options>& row : table) {
-      add(
-          row, [&row, &options] { return row.get(options); },
-          [&row, &options](const nlohmann::json& value) { row.set(options, value); });
-    }
+  void fields(Options& options) {
+    add(description_of(options));
   }
+  void add(const Description& description);
 
   /// Reads the arguments. Call it once, after all options were added.
   /// @throw HelpText; ListedOptions; InputError naming option, value and rule.
@@ -97,12 +89,10 @@ class OptionSet {
 
  private:
   struct Parser;
-  using Getter = std::function<nlohmann::json()>;
-  using Setter = std::function<void(const nlohmann::json&)>;
 
-  void add(const OptionSpec& spec, Getter get, Setter set);
+  void bind(const Field& field);
   void add_common();
-  [[nodiscard]] std::vector<OptionSpec> listed() const;
+  [[nodiscard]] std::vector<FieldSpec> listed() const;
   /// The options of the command as mdoc list items.
   [[nodiscard]] std::string manual() const;
 

@@ -5,7 +5,7 @@
 
 #include <chrono>
 #include <future>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <stop_token>
 #include <utility>
 

@@ -4,14 +4,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/schema/option_text.h"
+
 namespace lensforge::python {
 namespace {
-
-std::string keyword_of(const std::string& option) {
-  std::string name = option.substr(option.find_first_not_of('-'));
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
-}
 
 bool is_bool(py::handle value) { return PyBool_Check(value.ptr()) != 0; }
 bool is_whole(py::handle value) { return !is_bool(value) && PyIndex_Check(value.ptr()) != 0; }
@@ -44,40 +40,22 @@ std::string list_word(py::handle values) {
 }
 
 /// A value as a word of the command line; empty if it is none of the option's kind.
-std::string word_of(const OptionSpec& spec, py::handle value) {
+std::string word_of(const FieldSpec& spec, py::handle value) {
   switch (spec.kind) {
-    case OptionKind::kWhole:
+    case FieldKind::kWhole:
       return is_whole(value) ? number_word(value) : "";
-    case OptionKind::kNumber:
+    case FieldKind::kNumber:
       return is_number(value) ? number_word(value) : "";
-    case OptionKind::kLength:
+    case FieldKind::kLength:
       if (is_number(value)) return number_word(value);
       break;
-    case OptionKind::kText:
+    case FieldKind::kText:
       if (!is_text(value) && py::isinstance<py::sequence>(value)) return list_word(value);
       break;
-    case OptionKind::kWord:
-    case OptionKind::kFlag:
+    default:
       break;
   }
   return is_text(value) ? text_word(value) : "";
-}
-
-const char* type_of(OptionKind kind) {
-  switch (kind) {
-    case OptionKind::kFlag:
-      return "bool";
-    case OptionKind::kWhole:
-      return "int";
-    case OptionKind::kNumber:
-      return "float";
-    case OptionKind::kLength:
-      return "float, mm, or a text with its unit";
-    case OptionKind::kWord:
-    case OptionKind::kText:
-      break;
-  }
-  return "str";
 }
 
 }  // namespace
@@ -91,14 +69,14 @@ Keywords::Keywords(std::string function, app::OptionSet& options,
     specs_ = listed.options;
   }
   static const std::set<std::string> common{"--json", "--quiet", "--config", "--help", "--version"};
-  std::erase_if(specs_, [&](const OptionSpec& spec) {
+  std::erase_if(specs_, [&](const FieldSpec& spec) {
     return !spec.name.starts_with("--") || common.contains(spec.name) ||
            withheld.contains(spec.name);
   });
 }
 
-const OptionSpec& Keywords::spec_of(const std::string& keyword) const {
-  const auto found = std::find_if(specs_.begin(), specs_.end(), [&](const OptionSpec& spec) {
+const FieldSpec& Keywords::spec_of(const std::string& keyword) const {
+  const auto found = std::find_if(specs_.begin(), specs_.end(), [&](const FieldSpec& spec) {
     return keyword_of(spec.name) == keyword;
   });
   if (found == specs_.end()) {
@@ -112,15 +90,15 @@ app::Arguments Keywords::words(const py::kwargs& given) const {
   app::Arguments words;
   for (const auto& [key, value] : given) {
     const auto keyword = key.cast<std::string>();
-    const OptionSpec& spec = spec_of(keyword);
-    if (spec.kind == OptionKind::kFlag && is_bool(value)) {
+    const FieldSpec& spec = spec_of(keyword);
+    if (spec.kind == FieldKind::kFlag && is_bool(value)) {
       if (value.cast<bool>()) words.push_back(spec.name);
       continue;
     }
     const std::string word = word_of(spec, value);
-    if (spec.kind == OptionKind::kFlag || word.empty()) {
+    if (spec.kind == FieldKind::kFlag || word.empty()) {
       throw py::type_error(function_ + "(): " + keyword + "=" +
-                           py::repr(value).cast<std::string>() + ": must be " + type_of(spec.kind));
+                           py::repr(value).cast<std::string>() + ": must be " + python_type(spec));
     }
     words.push_back(spec.name);
     words.back() += "=";
@@ -131,13 +109,7 @@ app::Arguments Keywords::words(const py::kwargs& given) const {
 
 std::string Keywords::text() const {
   std::string text;
-  for (const OptionSpec& spec : specs_) {
-    text += "\n  " + keyword_of(spec.name) + " (" + type_of(spec.kind) + "): " + spec.help;
-    if (spec.is_number()) text += "; " + spec.limits.rule();
-    for (const std::string& word : spec.words) {
-      text += (word == spec.words.front() ? "; " : ", ") + word;
-    }
-  }
+  for (const FieldSpec& spec : specs_) text += docstring_line(spec);
   return text;
 }
 

@@ -40,10 +40,10 @@ class Keywords {
  private:
   Keywords(std::string function, app::OptionSet& options, const std::set<std::string>& withheld);
 
-  [[nodiscard]] const OptionSpec& spec_of(const std::string& keyword) const;
+  [[nodiscard]] const FieldSpec& spec_of(const std::string& keyword) const;
 
   std::string function_;
-  std::vector<OptionSpec> specs_;
+  std::vector<FieldSpec> specs_;
 };
 
 }  // namespace lensforge::python

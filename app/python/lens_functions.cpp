@@ -142,7 +142,8 @@ void add_lens(py::module_& module) {
       "metrics", [](const LensObject& self) { return object_from(app::metrics_json(self.lens())); },
       "dict: for every surface model how close its picture is to the target.");
   type.def_property_readonly(
-      "provenance", [](const LensObject& self) { return object_from(self.lens().provenance); },
+      "provenance",
+      [](const LensObject& self) { return object_from(self.lens().provenance.json()); },
       "dict: the program, options and outcome that the lens comes from.");
   type.def_property_readonly(
       "folder",
@@ -209,18 +210,8 @@ py::object design(const py::object& picture, const app::Arguments& words) {
 // --- render
 
 /// Render options for a lens in one colour.
-const OptionTable<RenderOptions>& lens_render_fields() {
-  static const OptionTable<RenderOptions> table = [] {
-    OptionTable<RenderOptions> rows = render_fields();
-    std::erase_if(
-        rows, [](const auto& row) { return row.name == "--wavelengths" || row.name == "--abbe"; });
-    return rows;
-  }();
-  return table;
-}
-
 void add_render_options(app::OptionSet& options, RenderOptions& render) {
-  options.fields(lens_render_fields(), render);
+  options.add(description_of(render).except({"--wavelengths", "--abbe"}));
 }
 
 /// The picture that a lens projects, in its target's light.

@@ -2,6 +2,7 @@
 #include <pybind11/pybind11.h>
 
 #include <exception>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "app/python/bindings.h"

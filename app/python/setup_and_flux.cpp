@@ -2,7 +2,6 @@
 #include <pybind11/pybind11.h>
 
 #include <algorithm>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -23,19 +22,10 @@ namespace lensforge::python {
 namespace {
 
 /// The options of a design that say how its lens is lit and seen.
-const OptionTable<DesignOptions>& setup_fields() {
-  static const OptionTable<DesignOptions> table = [] {
-    const std::set<std::string> wanted{"--width", "--focal", "--ior", "--thickness", "--view"};
-    OptionTable<DesignOptions> rows = design_fields();
-    std::erase_if(rows, [&](const auto& row) { return !wanted.contains(row.name); });
-    return rows;
-  }();
-  return table;
-}
-
 void add_options(app::OptionSet& options, DesignOptions& design) {
-  options.fields(setup_fields(), design);
-  options.fields(light_fields(), design.light);
+  options.add(
+      description_of(design).only({"--width", "--focal", "--ior", "--thickness", "--view"}));
+  options.fields(design.light);
 }
 
 /// @throw InputError naming the side.

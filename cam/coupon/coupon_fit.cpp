@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/coupon/coupon_fit.h"
 
+#include <toml++/toml.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
@@ -16,9 +18,9 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
+#include "core/schema/toml.h"
 #include "core/text/number_text.h"
 #include "core/text/printable.h"
-#include "core/text/toml_fields.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
 

@@ -9,7 +9,6 @@
 #include "cam/post/post_description.h"
 #include "cam/post/program_writer.h"
 #include "cam/workshop/workshop.h"
-#include "core/text/option_field.h"
 
 namespace lensforge {
 
@@ -26,7 +25,7 @@ struct CouponOptions {
 };
 
 /// The command's options.
-const OptionTable<CouponOptions>& coupon_fields();
+void describe(Description& d, CouponOptions& o);
 
 /// @throw InputError naming option or key, value and rule.
 void validate(const CouponOptions& options);

@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/schema/toml.h"
 #include "core/text/number_text.h"
-#include "core/text/toml_fields.h"
 #include "core/text/version.h"
 
 namespace lensforge {
@@ -181,25 +181,25 @@ constexpr const char* kHead =
     "# Then: lensforge coupon --fit THIS FILE --workshop WORKSHOP.toml --out FITTED.toml\n";
 
 std::optional<Reading> read(TomlFields& fields, const ReadingKeys& keys) {
-  const NumberRule rule{keys.uncertainty, kFinestUncertainty * keys.least, keys.most};
+  const Limits limits{kFinestUncertainty * keys.least, keys.most};
   // The template states uncertainties for readings that were not taken, too.
-  const double uncertainty = fields.number_or(rule, 0.0);
+  const double uncertainty = fields.number_or(keys.uncertainty, limits, 0.0);
   if (!fields.has(keys.value)) return std::nullopt;
-  const double value = fields.number({keys.value, keys.least, keys.most});
+  const double value = fields.number(keys.value, {keys.least, keys.most});
   if (!(uncertainty > 0.0)) fields.refuse(keys.uncertainty, "a reading needs its uncertainty");
   return Reading{value * keys.unit, uncertainty * keys.unit};
 }
 
 MarkReadings read_mark(TomlFields& fields) {
-  return {fields.number({"programmed_mm", 1.0, 1000.0}), read(fields, kDistance)};
+  return {fields.number("programmed_mm", {1.0, 1000.0}), read(fields, kDistance)};
 }
 
 GrooveReadings read_groove(TomlFields& fields) {
-  return {fields.number({"depth_mm", 1e-4, 10.0}), read(fields, kWidth)};
+  return {fields.number("depth_mm", {1e-4, 10.0}), read(fields, kWidth)};
 }
 
 PadReadings read_pad(TomlFields& fields) {
-  return {fields.number({"pitch_mm", 1e-4, 10.0}), read(fields, kBefore), read(fields, kAfter),
+  return {fields.number("pitch_mm", {1e-4, 10.0}), read(fields, kBefore), read(fields, kAfter),
           read(fields, kOrders)};
 }
 
@@ -221,9 +221,9 @@ CouponLight read_light(TomlFields& file) {
   CouponLight light;
   if (!file.has("light")) return light;
   TomlFields fields = file.table("light");
-  light.wavelength = kNanometre * fields.number_or({"wavelength_nm", 200.0, 2000.0},
+  light.wavelength = kNanometre * fields.number_or("wavelength_nm", {200.0, 2000.0},
                                                    light.wavelength / kNanometre);
-  light.ior = fields.number_or({"ior", 1.01, 5.0}, light.ior);
+  light.ior = fields.number_or("ior", {1.01, 5.0}, light.ior);
   fields.finish();
   return light;
 }
@@ -304,8 +304,7 @@ std::string readings_template(const CouponReadings& expected) {
 }
 
 CouponReadings parse_readings(std::string_view text, const std::string& file) {
-  const toml::table document = parse_toml(text, file);
-  TomlFields fields(document, {file, "a file of readings"});
+  TomlFields fields(text, {file, "a file of readings"});
   CouponReadings readings;
   readings.light = read_light(fields);
   readings.marks = entries<MarkReadings>(fields, "mark", read_mark);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <variant>
 
@@ -434,7 +435,7 @@ std::string index_warning(const CutSetup& setup) {
 
 /// Intended process of the lens if it differs from the actual one; else, or if unknown, empty.
 std::string process_warning(const CutSetup& setup) {
-  const nlohmann::json& provenance = setup.lens->provenance;
+  const nlohmann::json& provenance = setup.lens->provenance.json();
   if (!provenance.is_object() || !provenance.contains("made_by")) return "";
   const nlohmann::json& meant = provenance["made_by"];
   const Workshop& shop = setup.options.workshop;
@@ -562,9 +563,10 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
 
 /// Fingerprint of the design from lens.json; empty if it has none.
 std::string fingerprint_of(const Lens& lens) {
-  if (!lens.provenance.is_object()) return "";
-  const auto stated = lens.provenance.find("fingerprint");
-  if (stated == lens.provenance.end() || !stated->is_string()) return "";
+  const nlohmann::json& provenance = lens.provenance.json();
+  if (!provenance.is_object()) return "";
+  const auto stated = provenance.find("fingerprint");
+  if (stated == provenance.end() || !stated->is_string()) return "";
   constexpr std::size_t kDigits = 16;
   const auto& text = stated->get_ref<const std::string&>();
   const bool hexadecimal = text.find_first_not_of("0123456789abcdef") == std::string::npos;

@@ -13,9 +13,8 @@
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/lens/optical_surface.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
-#include "core/text/option_field.h"
-#include "core/text/toml_fields.h"
 
 namespace lensforge {
 namespace {
@@ -202,7 +201,7 @@ Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& 
 
 void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate(options.workshop, "workshop");
-  require_limits(cam_fields(), options);
+  require_limits(options);
   const Tool& ball = options.workshop.tool(options.workshop.process.finish.tool);
   const double smallest = setup.lens_size.minCoeff();
   if (!(ball.diameter < smallest)) {
@@ -239,287 +238,207 @@ bool cuts_outline(const CamOptions& options, const OpticalSetup& setup) {
 
 namespace {
 
-using O = CamOptions;
-using R = Row<O>;
-using Field = OptionField<O>;
-
 constexpr double kMegabyte = 1e6;
 
-/// The limits of one of the workshop's numbers (workshop_rule()).
-Limits as_in_workshop(const char* key) {
-  const NumberRule rule = workshop_rule(key);
-  return Limits::between(rule.least, rule.most);
-}
+/// Number of a tool in a process.
+using ToolNumber = int (*)(const Process&);
+constexpr ToolNumber kBall = [](const Process& process) { return process.finish.tool; };
+constexpr ToolNumber kRougher = [](const Process& process) { return process.rough.tool; };
 
-Tool& tool_of(Workshop& workshop, int number) {
-  for (Tool& tool : workshop.tools) {
-    if (tool.number == number) return tool;
+/// A tool of the workshop, which a file replaces as a whole.
+Tool& tool_of(CamOptions& o, ToolNumber number) {
+  const int wanted = number(o.workshop.process);
+  for (Tool& tool : o.workshop.tools) {
+    if (tool.number == wanted) return tool;
   }
-  throw InputError("--workshop: there is no tool " + std::to_string(number));
+  throw InputError("--workshop: there is no tool " + std::to_string(wanted));
 }
 
-const Tool& tool_of(const Workshop& workshop, int number) { return workshop.tool(number); }
-
-constexpr auto kBallNumber = [](const Process& process) { return process.finish.tool; };
-constexpr auto kRougherNumber = [](const Process& process) { return process.rough.tool; };
-constexpr auto kBall = [](auto& o) -> auto& {
-  return tool_of(o.workshop, kBallNumber(o.workshop.process));
-};
-constexpr auto kRougher = [](auto& o) -> auto& {
-  return tool_of(o.workshop, kRougherNumber(o.workshop.process));
-};
-constexpr auto kFinish = [](auto& o) -> auto& { return o.workshop.process.finish; };
-
-/// A member of a part of the options, which `at` returns.
-template <class At, class Member>
-auto in(At at, Member member) {
-  return [ at, member ](auto& o) -> auto& { return std::invoke(member, at(o)); };
+/// A number of the finishing ball.
+void describe_ball(Description& d, CamOptions& o, const char* name, double Tool::*member,
+                   const Field& key, const char* help) {
+  d.number(
+      name, [&o, member]() -> double& { return tool_of(o, kBall).*member; }, key.limits, key.unit,
+      help);
 }
 
-/// The diameter of a tool, whose flutes and neck keep their proportions; null where the workshop
+/// The diameter of a tool, whose flutes and neck keep their proportions; none where the workshop
 /// has no such tool, which a disabled process may name.
-template <class At, class Number>
-Field diameter(const char* name, At tool, Number number, const char* help) {
-  Field row = R::length(name, in(tool, &Tool::diameter), as_in_workshop("tool.diameter"), help);
-  row.get = [number](const O& o) {
+void describe_diameter(Description& d, CamOptions& o, const char* name, ToolNumber number,
+                       const Field& key, const char* help) {
+  Field& field = d.like(key, name, help);
+  field.get = [&o, number] {
     const Tool* const found = o.workshop.find_tool(number(o.workshop.process));
-    return found == nullptr ? nlohmann::json() : nlohmann::json(found->diameter);
+    return found == nullptr ? FieldValue() : FieldValue(found->diameter);
   };
-  row.set = [tool](O& o, const nlohmann::json& value) {
-    tool(o) = resized(tool(o), value.get<double>());
+  field.set = [&o, number](const FieldValue& value) {
+    Tool& tool = tool_of(o, number);
+    tool = resized(tool, number_of(value));
   };
-  return row;
 }
 
-/// A given pitch takes precedence over one from a scallop.
-Field pitch_row() {
-  Field row = R::length("--pitch", in(kFinish, &FinishProcess::pitch),
-                        as_in_workshop("finish.pitch"), "maximum stepover between rows");
-  row.set = [](O& o, const nlohmann::json& value) { kFinish(o).set_pitch(value.get<double>()); };
-  return row;
+void describe_tools(Description& d, CamOptions& o, const Description& shop) {
+  const Field diameter = shop.at("tool.diameter");
+  describe_diameter(d, o, "--tool-diameter", kBall, diameter, "finishing ball-end mill");
+  // A given pitch takes precedence over one from a scallop.
+  d.like(shop.at("finish.pitch"), "--pitch", "maximum stepover between rows").set =
+      [&finish = o.workshop.process.finish](const FieldValue& value) {
+        finish.set_pitch(number_of(value));
+      };
+  d.like(shop.at("finish.scallop"), "--scallop",
+         "height of scallops; if above 0, the pitch follows from it");
+  describe_ball(d, o, "--spindle", &Tool::spindle_rpm, shop.at("tool.spindle_rpm"),
+                "finishing speed");
+  describe_ball(d, o, "--feed", &Tool::feed, shop.at("tool.feed"), "finishing feed");
+  describe_ball(d, o, "--plunge", &Tool::plunge, shop.at("tool.plunge"), "feed straight down");
+  describe_diameter(d, o, "--rough-tool", kRougher, diameter, "diameter of the roughing tool");
+  d.flag("--force", o.force,
+         "replace files that lensforge did not write, or that were changed since");
 }
 
-OptionTable<O> tool_rows() {
-  return {
-      diameter("--tool-diameter", kBall, kBallNumber, "finishing ball-end mill"),
-      pitch_row(),
-      R::length("--scallop", in(kFinish, &FinishProcess::scallop), as_in_workshop("finish.scallop"),
-                "height of scallops; if above 0, the pitch follows from it"),
-      R::number("--spindle", in(kBall, &Tool::spindle_rpm), as_in_workshop("tool.spindle_rpm"),
-                "rpm", "finishing speed"),
-      R::number("--feed", in(kBall, &Tool::feed), as_in_workshop("tool.feed"), "mm/min",
-                "finishing feed"),
-      R::number("--plunge", in(kBall, &Tool::plunge), as_in_workshop("tool.plunge"), "mm/min",
-                "feed straight down"),
-      diameter("--rough-tool", kRougher, kRougherNumber, "diameter of the roughing tool"),
-      R::flag("--force", &O::force,
-              "replace files that lensforge did not write, or that were changed since")};
+void describe_raster(Description& d, CamOptions& o, const Description& shop) {
+  Process& process = o.workshop.process;
+  d.like(shop.at("finish.along"), "--along", "axis along which finishing rows run");
+  d.like(shop.at("finish.style"), "--order", "finishing rows to and fro, or all one way");
+  d.like(shop.at("finish.cross"), "--cross", "finish a second time, along the other axis");
+  d.like(shop.at("finish.pencil"), "--pencil", "a last pass along the creases");
+  d.like(shop.at("finish.tolerance"), "--tolerance",
+         "largest distance of the path from the exact one");
+  d.like(shop.at("finish.slope_tolerance"), "--slope-tolerance",
+         "largest error of a move's direction");
+  d.whole("--decimals", o.decimals, Limits::zero_or(4, 6),
+          "digits after the point; 0: as the tolerances ask");
+  d.without("--no-arcs", o.arcs, "straight finishing moves only");
+  d.without("--no-rough", process.rough.enabled, "no roughing program");
+  d.without("--no-semi", process.semi.enabled, "no semi-finishing program");
 }
 
-OptionTable<O> raster_rows() {
-  return {R::word<PassAxis>("--along", in(kFinish, &FinishProcess::along),
-                            {{"x", PassAxis::kX}, {"y", PassAxis::kY}},
-                            "axis along which finishing rows run"),
-          R::word<PassStyle>("--order", in(kFinish, &FinishProcess::style),
-                             {{"zigzag", PassStyle::kZigzag},
-                              {"climb", PassStyle::kClimb},
-                              {"conventional", PassStyle::kConventional}},
-                             "finishing rows to and fro, or all one way"),
-          R::flag("--cross", in(kFinish, &FinishProcess::cross),
-                  "finish a second time, along the other axis"),
-          R::flag("--pencil", in(kFinish, &FinishProcess::pencil), "a last pass along the creases"),
-          R::length("--tolerance", in(kFinish, &FinishProcess::tolerance),
-                    as_in_workshop("finish.tolerance"),
-                    "largest distance of the path from the exact one"),
-          R::number("--slope-tolerance", in(kFinish, &FinishProcess::slope_tolerance),
-                    as_in_workshop("finish.slope_tolerance"), "rad",
-                    "largest error of a move's direction"),
-          R::whole("--decimals", &O::decimals, Limits::zero_or(4, 6),
-                   "digits after the point; 0: as the tolerances ask"),
-          R::without("--no-arcs", &O::arcs, "straight finishing moves only"),
-          R::without(
-              "--no-rough", [](auto& o) -> auto& { return o.workshop.process.rough.enabled; },
-              "no roughing program"),
-          R::without(
-              "--no-semi", [](auto& o) -> auto& { return o.workshop.process.semi.enabled; },
-              "no semi-finishing program")};
-}
-
-OptionTable<O> outline_rows() {
-  constexpr auto tabs = [](auto& o) -> auto& { return o.tabs; };
-  return {R::word<OutlineWish>("--cut-outline", &O::cut_outline,
-                               {{"auto", OutlineWish::kIfShaped},
-                                {"always", OutlineWish::kAlways},
-                                {"never", OutlineWish::kNever}},
-                               "cut the lens out of its blank, last; auto: if it has an outline"),
-          R::whole("--outline-tool", &O::outline_tool, Limits::between(0, 9999),
-                   "number of the flat end mill for it; 0: the roughing tool"),
-          R::whole("--tabs", in(tabs, &TabOptions::count), Limits::between(0, cam_limit::kMaxTabs),
-                   "tabs that hold the lens in its frame until they are snapped; fewer where they "
-                   "do not fit"),
-          R::length("--tab-width", in(tabs, &TabOptions::width),
-                    Limits::between(cam_limit::kThinnestTab, cam_limit::kWidestTab),
-                    "of a tab along the outline"),
-          R::length("--tab-height", in(tabs, &TabOptions::height),
-                    Limits::between(cam_limit::kThinnestTab, cam_limit::kHighestTab),
-                    "of a tab above the blank's underside")};
+void describe_outline(Description& d, CamOptions& o) {
+  d.word("--cut-outline", o.cut_outline,
+         {{"auto", OutlineWish::kIfShaped},
+          {"always", OutlineWish::kAlways},
+          {"never", OutlineWish::kNever}},
+         "cut the lens out of its blank, last; auto: if it has an outline");
+  d.whole("--outline-tool", o.outline_tool, Limits::between(0, 9999),
+          "number of the flat end mill for it; 0: the roughing tool");
+  d.whole("--tabs", o.tabs.count, Limits::between(0, cam_limit::kMaxTabs),
+          "tabs that hold the lens in its frame until they are snapped; fewer where they do not "
+          "fit");
+  d.length("--tab-width", o.tabs.width,
+           Limits::between(cam_limit::kThinnestTab, cam_limit::kWidestTab),
+           "of a tab along the outline");
+  d.length("--tab-height", o.tabs.height,
+           Limits::between(cam_limit::kThinnestTab, cam_limit::kHighestTab),
+           "of a tab above the blank's underside");
 }
 
 /// The surfaces of a lens that can be cut.
-R::Choices<std::optional<SurfaceModel>> surfaces() {
-  R::Choices<std::optional<SurfaceModel>> words{{"designed", std::nullopt}};
+Choices<std::optional<SurfaceModel>> surfaces() {
+  Choices<std::optional<SurfaceModel>> words{{"designed", std::nullopt}};
   for (const auto& [word, model] : named_models()) words.emplace_back(word, model);
   return words;
 }
 
-OptionTable<O> blank_rows() {
-  using Surface = std::optional<SurfaceModel>;
-  return {
-      R::length(
-          "--stock", [](auto& o) -> auto& { return o.workshop.stock.allowance; },
-          as_in_workshop("stock.allowance"), "top of the blank above the surface's highest point"),
-      R::length(
-          "--margin", [](auto& o) -> auto& { return o.workshop.stock.margin; },
-          as_in_workshop("stock.margin"), "blank beyond the lens on every side"),
-      R::length(
-          "--safe-height", [](auto& o) -> auto& { return o.workshop.process.safe_height; },
-          as_in_workshop("process.safe_height"),
-          "height of rapid moves above the top of the blank"),
-      R::word<ZZero>("--z-zero", &O::z_zero,
-                     {{"stock", ZZero::kStock}, {"table", ZZero::kTable}, {"lens", ZZero::kLens}},
-                     "Z0: top of the blank, the table below it, or the lens's highest point"),
-      R::word<PartKind>("--part", &O::part,
-                        {{"lens", PartKind::kLens}, {"mould", PartKind::kMould}},
-                        "mill the lens, or the mould to cast it in"),
-      R::number("--shrinkage", &O::shrinkage, Limits::between(0, kMaxShrinkage), "",
-                "shrinkage of the cast part, share of a length"),
-      R::word<Surface>("--surface", &O::surface, surfaces(),
-                       "cut what was designed, the smooth surface over the mesh, its facets, or a "
-                       "lens's own spline")};
+void describe_blank(Description& d, CamOptions& o, const Description& shop) {
+  d.like(shop.at("stock.allowance"), "--stock",
+         "top of the blank above the surface's highest point");
+  d.like(shop.at("stock.margin"), "--margin", "blank beyond the lens on every side");
+  d.like(shop.at("process.safe_height"), "--safe-height",
+         "height of rapid moves above the top of the blank");
+  d.word("--z-zero", o.z_zero,
+         {{"stock", ZZero::kStock}, {"table", ZZero::kTable}, {"lens", ZZero::kLens}},
+         "Z0: top of the blank, the table below it, or the lens's highest point");
+  d.word("--part", o.part, {{"lens", PartKind::kLens}, {"mould", PartKind::kMould}},
+         "mill the lens, or the mould to cast it in");
+  d.number("--shrinkage", o.shrinkage, Limits::between(0, kMaxShrinkage), "",
+           "shrinkage of the cast part, share of a length");
+  d.word("--surface", o.surface, surfaces(),
+         "cut what was designed, the smooth surface over the mesh, its facets, or a lens's own "
+         "spline");
 }
 
 /// The size limit of a program, stored in bytes.
-Field split() {
+void describe_split(Description& d, std::uintmax_t& bytes) {
   const Limits limits =
       Limits::zero_or(static_cast<double>(kSmallestProgramLimit) / kMegabyte, 1e5);
-  Field row{{"--split",
-             OptionKind::kNumber,
-             "split programs above this size; 0: the dialect's own limit",
-             limits,
-             "MB",
-             {}},
-            [](const O& o) { return static_cast<double>(o.largest_file) / kMegabyte; },
-            [](O& o, const nlohmann::json& value) {
-              o.largest_file =
-                  static_cast<std::uintmax_t>(std::llround(value.get<double>() * kMegabyte));
-            },
-            {},
-            {}};
-  row.stored = row.get;
-  return row;
+  d.add({{"--split", FieldKind::kNumber,
+          "split programs above this size; 0: the dialect's own limit", limits, "MB"},
+         [&bytes] { return FieldValue(static_cast<double>(bytes) / kMegabyte); },
+         [&bytes](const FieldValue& value) {
+           bytes = static_cast<std::uintmax_t>(std::llround(number_of(value) * kMegabyte));
+         }});
 }
 
-Field post() {
-  Field row = R::text(
-      "--post", [](auto& o) -> auto& { return o.post.name; }, "NAME|FILE.toml",
-      "dialect: linuxcnc, grbl, grblhal, fanuc, weihong, or a description of one");
-  row.set = [](O& o, const nlohmann::json& value) { o.post = find_post(value, "--post"); };
-  return row;
+void describe_programs(Description& d, CamOptions& o) {
+  describe_post(d, o.post);
+  d.word("--programs", o.grouping,
+         {{"operation", ProgramGrouping::kOperation},
+          {"tool", ProgramGrouping::kTool},
+          {"one", ProgramGrouping::kAll}},
+         "a file per operation, per tool, or one where the dialect changes tools");
+  describe_split(d, o.largest_file);
+  describe_spindle_start(d, o.spin_up, o.coolant);
 }
 
-OptionTable<O> program_rows() {
-  return {post(),
-          R::word<ProgramGrouping>(
-              "--programs", &O::grouping,
-              {{"operation", ProgramGrouping::kOperation},
-               {"tool", ProgramGrouping::kTool},
-               {"one", ProgramGrouping::kAll}},
-              "a file per operation, per tool, or one where the dialect changes tools"),
-          split(),
-          R::number("--spin-up", &O::spin_up, Limits::between(0, kMaxPause), "s",
-                    "wait after spindle start"),
-          R::word<Coolant>(
-              "--coolant", &O::coolant,
-              {{"off", Coolant::kOff}, {"mist", Coolant::kMist}, {"flood", Coolant::kFlood}},
-              "coolant")};
+void describe_prediction(Description& d, CamOptions& o, const Description& shop) {
+  d.without("--no-render", o.render, "programs only, without the predicted picture");
+  d.without("--no-remedies", o.remedies, "do not try what helps where most light leaks");
+  d.whole("--tolerances", o.tolerances,
+          Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
+          "how sure the forecast is: predict so many parts with the errors of the workshop's "
+          "[tolerances]; 0: none");
+  d.whole("--tolerance-seed", o.tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),
+          "seed of the random numbers of --tolerances");
+  d.like(shop.at("polish.sigma"), "--polish-sigma",
+         "polishing averages heights with a Gaussian of this σ");
+  d.like(shop.at("polish.rim_depth"), "--rim-depth",
+         "extra depth that polishing removes at the rim");
+  d.like(shop.at("polish.rim_length"), "--rim-length",
+         "distance from the rim over which the extra depth falls to a third");
+  d.length("--sample-spacing", o.sample_spacing,
+           Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
+           "spacing of samples of the milled surface across its passes, up to three times that "
+           "along them; 0: chosen from pitch and σ");
+  d.number("--dark-below", o.leakage.dark_below, Limits::between(0, cam_limit::kDark), "",
+           "parts of the picture below this share of its mean are dark");
 }
 
-OptionTable<O> prediction_rows() {
-  constexpr auto polish = [](auto& o) -> auto& { return o.workshop.polish; };
-  return {
-      R::without("--no-render", &O::render, "programs only, without the predicted picture"),
-      R::without("--no-remedies", &O::remedies, "do not try what helps where most light leaks"),
-      R::whole("--tolerances", &O::tolerances,
-               Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
-               "how sure the forecast is: predict so many parts with the errors of the workshop's "
-               "[tolerances]; 0: none"),
-      R::whole("--tolerance-seed", &O::tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),
-               "seed of the random numbers of --tolerances"),
-      R::length("--polish-sigma", in(polish, &PolishModel::sigma), as_in_workshop("polish.sigma"),
-                "polishing averages heights with a Gaussian of this σ"),
-      R::length("--rim-depth", in(polish, &PolishModel::rim_depth),
-                as_in_workshop("polish.rim_depth"),
-                "extra depth that polishing removes at the rim"),
-      R::length("--rim-length", in(polish, &PolishModel::rim_length),
-                as_in_workshop("polish.rim_length"),
-                "distance from the rim over which the extra depth falls to a third"),
-      R::length("--sample-spacing", &O::sample_spacing,
-                Limits::zero_or(cam_limit::kFinestSample, cam_limit::kCoarsestSample),
-                "spacing of samples of the milled surface across its passes, up to three times "
-                "that along "
-                "them; 0: chosen from pitch and σ"),
-      R::number(
-          "--dark-below", [](auto& o) -> auto& { return o.leakage.dark_below; },
-          Limits::between(0, cam_limit::kDark), "",
-          "parts of the picture below this share of its mean are dark")};
-}
-
-/// A limit of quality, which is advice until an option states it.
-Field stated(const char* key, Field row) {
-  row.set = [key, set = row.set](O& o, const nlohmann::json& value) {
-    set(o, value);
-    o.stated_limits.insert(key);
-  };
-  return row;
-}
-
-OptionTable<O> limit_rows() {
-  constexpr auto limits = [](auto& o) -> auto& { return o.limits; };
+/// A limit of quality is advice until an option states it.
+void describe_limits(Description& d, CamOptions& o) {
   const Limits any = Limits::between(0, cam_limit::kLimit);
-  const auto number = [&](const char* name, auto member, const char* unit, const char* help) {
-    return R::number(name, in(limits, member), any, unit, help);
+  const auto advice = [&o](const char* key, Field& field) {
+    field.set = [&o, key, set = field.set](const FieldValue& value) {
+      set(value);
+      o.stated_limits.insert(key);
+    };
   };
-  const auto length = [&](const char* name, auto member, const char* help) {
-    return R::length(name, in(limits, member), any, help);
-  };
-  return {stated("leakage", number("--max-leakage", &CutLimits::leakage, "",
-                                   "verdict: share of light that may land where the design puts "
-                                   "less")),
-          stated("dark_flux", number("--max-dark", &CutLimits::dark_flux, "",
-                                     "verdict: share of light that may land in dark parts")),
-          stated("mae_increase", number("--max-mae-increase", &CutLimits::mae_increase, "",
-                                        "verdict: MAE of the part above that of the design")),
-          length("--max-gouge", &CutLimits::gouge, "verdict: deepest cut below the exact path"),
-          stated("excess", length("--max-excess", &CutLimits::excess,
-                                  "verdict: highest path above the exact one")),
-          stated("slope", number("--max-slope", &CutLimits::slope, "rad",
-                                 "verdict: error of the path's direction over 5 µm")),
-          stated("fillet_depth", length("--max-fillet", &CutLimits::fillet_depth,
-                                        "verdict: material that the ball leaves in creases"))};
+  CutLimits& limits = o.limits;
+  advice("leakage", d.number("--max-leakage", limits.leakage, any, "",
+                             "verdict: share of light that may land where the design puts less"));
+  advice("dark_flux", d.number("--max-dark", limits.dark_flux, any, "",
+                               "verdict: share of light that may land in dark parts"));
+  advice("mae_increase", d.number("--max-mae-increase", limits.mae_increase, any, "",
+                                  "verdict: MAE of the part above that of the design"));
+  d.length("--max-gouge", limits.gouge, any, "verdict: deepest cut below the exact path");
+  advice("excess",
+         d.length("--max-excess", limits.excess, any, "verdict: highest path above the exact one"));
+  advice("slope", d.number("--max-slope", limits.slope, any, "rad",
+                           "verdict: error of the path's direction over 5 µm"));
+  advice("fillet_depth", d.length("--max-fillet", limits.fillet_depth, any,
+                                  "verdict: material that the ball leaves in creases"));
 }
 
 }  // namespace
 
-const OptionTable<CamOptions>& cam_fields() {
-  static const OptionTable<O> table = [] {
-    OptionTable<O> all;
-    for (const OptionTable<O>& rows : {tool_rows(), raster_rows(), blank_rows(), outline_rows(),
-                                       program_rows(), prediction_rows(), limit_rows()}) {
-      all.insert(all.end(), rows.begin(), rows.end());
-    }
-    return all;
-  }();
-  return table;
+void describe(Description& d, CamOptions& options) {
+  const Description shop = description_of(options.workshop);
+  describe_tools(d, options, shop);
+  describe_raster(d, options, shop);
+  describe_blank(d, options, shop);
+  describe_outline(d, options);
+  describe_programs(d, options);
+  describe_prediction(d, options, shop);
+  describe_limits(d, options);
 }
 
 }  // namespace lensforge

@@ -18,8 +18,7 @@
 
 namespace lensforge {
 
-template <class Options>
-struct OptionField;
+class Description;
 struct Passes;
 
 /// Position of program Z = 0.
@@ -80,7 +79,7 @@ struct CamOptions {
   std::set<std::string> stated_limits;  ///< Keys of CutLimits that are limits, not advice.
 };
 
-/// Minimum and maximum of the options below; for those of the workshop see workshop_rule().
+/// Minimum and maximum of the options below; for those of the workshop see workshop_limits().
 namespace cam_limit {
 inline constexpr double kDark = 1e3;   ///< Of LeakageOptions::dark_below: above any picture.
 inline constexpr double kLimit = 1e6;  ///< Of each of CutLimits, in its own unit.
@@ -124,7 +123,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup);
 const char* words_for(ZZero zero);
 const char* words_for(SurfaceModel surface);
 
-/// Table of a cut's options. Numbers of the workshop file use its values and limits.
-const std::vector<OptionField<CamOptions>>& cam_fields();
+/// The command's options. Numbers of the workshop file use its values and limits.
+void describe(Description& d, CamOptions& options);
 
 }  // namespace lensforge

@@ -12,9 +12,9 @@
 
 #include "cam/post/builtin_posts.h"
 #include "core/error.h"
+#include "core/schema/toml.h"
 #include "core/text/lower_case.h"
 #include "core/text/number_text.h"
-#include "core/text/toml_fields.h"
 #include "core/text/words.h"
 #include "machine/gcode/gcode_interpreter.h"
 #include "machine/gcode/program_seal.h"
@@ -338,7 +338,7 @@ constexpr double kSmallestFile = 1 << 14;      ///< Bytes; head and end need som
 
 void check_format(TomlFields& root) {
   (void)root.one_of("format", {"lensforge.post"});
-  if (root.whole({"version", 0, 1e6}) != 1) root.refuse("version", "this program reads version 1");
+  if (root.whole("version", {0, 1e6}) != 1) root.refuse("version", "this program reads version 1");
 }
 
 std::string read_extension(TomlFields& root) {
@@ -351,10 +351,10 @@ std::string read_extension(TomlFields& root) {
 }
 
 void read_numbers(TomlFields fields, PostDescription& post) {
-  post.most_decimals = fields.whole({"most_decimals", 0, 6});
+  post.most_decimals = fields.whole("most_decimals", {0, 6});
   post.trailing_zeros = fields.flag("trailing_zeros");
   post.whole_with_point = fields.flag("whole_with_point");
-  post.feed_decimals = fields.whole({"feed_decimals", 0, 6});
+  post.feed_decimals = fields.whole("feed_decimals", {0, 6});
   fields.finish();
 }
 
@@ -368,16 +368,16 @@ LineNumbers line_numbers(TomlFields& fields) {
 void read_line_numbers(TomlFields& fields, PostDescription& post) {
   post.numbers = line_numbers(fields);
   const double largest = static_cast<double>(post.reader.max_line_number);
-  post.first_number = fields.whole({"first_number", 0, largest});
-  post.number_step = fields.whole({"number_step", 1, 1000});
-  post.largest_number = fields.whole({"largest_number", 1, std::min(largest, kLargestNumber)});
+  post.first_number = fields.whole("first_number", {0, largest});
+  post.number_step = fields.whole("number_step", {1, 1000});
+  post.largest_number = fields.whole("largest_number", {1, std::min(largest, kLargestNumber)});
   if (post.largest_number < post.first_number) {
     fields.refuse("largest_number", "must not be below first_number");
   }
 }
 
 void read_lines(TomlFields fields, PostDescription& post) {
-  post.longest_line = static_cast<std::size_t>(fields.whole({"longest", 40, 250}));
+  post.longest_line = static_cast<std::size_t>(fields.whole("longest", {40, 250}));
   post.crlf = fields.one_of("end", {"lf", "crlf"}) == "crlf";
   post.percent = fields.flag("percent");
   post.spaces = fields.flag("spaces");
@@ -387,7 +387,7 @@ void read_lines(TomlFields fields, PostDescription& post) {
     fields.refuse("feed_on_every_line", "must be true for reader " + post.reader.name);
   }
   read_line_numbers(fields, post);
-  const double bytes = fields.number({"largest_file", 0, 1e15});
+  const double bytes = fields.number("largest_file", {0, 1e15});
   if (bytes > 0 && bytes < kSmallestFile) {
     fields.refuse("largest_file", "must be 0 or at least 16384 bytes");
   }
@@ -433,7 +433,7 @@ void read_arcs(TomlFields fields, PostDescription& post) {
 }
 
 void read_program(TomlFields fields, PostDescription& post) {
-  post.first_program_number = fields.whole({"first_program_number", 1, kLargestNumber});
+  post.first_program_number = fields.whole("first_program_number", {1, kLargestNumber});
   post.head = fields.texts("head");
   post.start = fields.texts("start");
   post.tool = fields.texts("tool");
@@ -464,8 +464,7 @@ std::vector<std::string> builtin_posts() {
 }
 
 PostDescription parse_post(std::string_view text, const std::string& file) {
-  const toml::table table = parse_toml(text, file);
-  TomlFields root(table, {file, kKind});
+  TomlFields root(text, {file, kKind});
   check_format(root);
   PostDescription post;
   post.name = root.text("name");
@@ -494,6 +493,16 @@ PostDescription find_post(const std::string& name_or_path, const std::string& op
   }
   throw InputError(option + ": '" + name_or_path + "' is none of " + names +
                    " and no path of a .toml file");
+}
+
+void describe_post(Description& d, PostDescription& post) {
+  constexpr const char* kOption = "--post";
+  d.text(
+      {.name = kOption,
+       .help = "dialect: linuxcnc, grbl, grblhal, fanuc, weihong, or a description of one",
+       .unit = "NAME|FILE.toml"},
+      [&post] { return post.name; },
+      [&post](const std::string& text) { post = find_post(text, kOption); });
 }
 
 }  // namespace lensforge

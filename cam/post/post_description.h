@@ -14,6 +14,8 @@
 
 namespace lensforge {
 
+class Description;
+
 /// Form of arcs.
 enum class ArcForm {
   kCentre,  ///< I J K from the start point to the centre.
@@ -102,6 +104,9 @@ PostDescription parse_post(std::string_view toml, const std::string& file);
 /// A built-in name, or the path of a TOML file (with a slash or ending in .toml).
 /// @throw InputError naming `option` and the value if it is neither; as parse_post().
 PostDescription find_post(const std::string& name_or_path, const std::string& option);
+
+/// The option --post.
+void describe_post(Description& d, PostDescription& post);
 
 /// Texts for the placeholders of a description's lines; an empty text drops the line.
 using PlaceholderTexts = std::map<std::string, std::string, std::less<>>;

@@ -13,6 +13,7 @@
 #include "cam/post/program_part.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
 #include "machine/gcode/program_seal.h"
 
@@ -436,6 +437,12 @@ std::vector<fs::path> programs_in_the_way(const ProgramPlan& plan, const PostDes
   }
   std::sort(found.begin(), found.end());
   return found;
+}
+
+void describe_spindle_start(Description& d, double& spin_up, Coolant& coolant) {
+  d.number("--spin-up", spin_up, Limits::between(0, kMaxPause), "s", "wait after spindle start");
+  d.word("--coolant", coolant,
+         {{"off", Coolant::kOff}, {"mist", Coolant::kMist}, {"flood", Coolant::kFlood}}, "coolant");
 }
 
 }  // namespace lensforge

@@ -128,6 +128,9 @@ std::vector<std::filesystem::path> programs_in_the_way(const ProgramPlan& plan,
 /// Maximum spin-up or tool change, s.
 inline constexpr double kMaxPause = 3600.0;
 
+/// The options --spin-up and --coolant.
+void describe_spindle_start(Description& d, double& spin_up, Coolant& coolant);
+
 /// @throw InputError naming what, value and rule.
 void validate(const ProgramSettings& settings, const PostDescription& post);
 

@@ -2,6 +2,7 @@
 #include "cam/report/report_json.h"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <variant>
 
 #include "cam/report/verdict.h"

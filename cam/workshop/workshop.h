@@ -14,7 +14,8 @@
 
 namespace lensforge {
 
-struct NumberRule;
+class Description;
+struct Limits;
 
 /// Axis along which the passes of a raster run.
 enum class PassAxis { kX, kY };
@@ -251,11 +252,25 @@ struct Workshop {
 /// and a tilted blank are off by 0.1 to 0.2 mm.
 inline constexpr double kMinSafeHeight = 0.5;
 
-/// Minimum and maximum of one of the workshop's numbers, by its key in the file:
-/// "process.safe_height", "tool.diameter", "finish.pitch". Options that set such a number follow
-/// the same rule.
-/// @pre there is such a number.
-NumberRule workshop_rule(const std::string& key);
+/// The keys of the workshop file, with ranges and comments (core/schema/description.h).
+void describe(Description& d, Machine& machine);
+void describe(Description& d, Material& material);
+void describe(Description& d, Stock& stock);
+void describe(Description& d, KeepOut& box);
+void describe(Description& d, ToolSection& section);
+void describe(Description& d, Tool& tool);
+void describe(Description& d, RoughProcess& rough);
+void describe(Description& d, SemiProcess& semi);
+void describe(Description& d, FinishProcess& finish);
+void describe(Description& d, Process& process);  ///< But for roughing, semi and finishing.
+void describe(Description& d, PolishModel& polish);
+void describe(Description& d, WavinessBand& band);
+void describe(Description& d, Tolerances& t);
+void describe(Description& d, Workshop& shop);
+
+/// The range of one of the workshop's numbers, by its key in the file: "process.safe_height",
+/// "tool.diameter", "finish.pitch". @pre there is such a number.
+Limits workshop_limits(std::string_view key);
 
 /// @param file  its name in messages.
 /// @throw InputError naming file, key, value and rule where a number is out of its range, or where

@@ -23,6 +23,7 @@
 #include "core/image/svg_drawing.h"
 #include "core/image/transfer.h"
 #include "core/io/files.h"
+#include "core/schema/description.h"
 #include "core/text/lower_case.h"
 #include "core/text/number_text.h"
 #include "core/text/printable.h"
@@ -39,23 +40,6 @@ bool is_hex_colour(const std::string& text) {
   return text.size() == 7 && text[0] == '#' &&
          std::all_of(text.begin() + 1, text.end(),
                      [](unsigned char c) { return std::isxdigit(c) != 0; });
-}
-
-OptionField<Background> background() {
-  const auto get = [](const Background& b) { return nlohmann::json(b.text()); };
-  const auto set = [](Background& b, const nlohmann::json& value) {
-    b = Background::parse(value.get<std::string>());
-  };
-  return {{kName,
-           OptionKind::kText,
-           "what shows through where a picture or drawing is transparent; a dark logo needs white",
-           {},
-           "black|white|#RRGGBB",
-           {}},
-          get,
-          set,
-          get,
-          "the picture is stored as it was flattened"};
 }
 
 }  // namespace
@@ -91,9 +75,15 @@ double Background::light() const {
   return light[0] == light[1] && light[1] == light[2] ? light[0] : luminance_rec709(light);
 }
 
-const OptionTable<Background>& background_fields() {
-  static const OptionTable<Background> table{background()};
-  return table;
+void describe(Description& d, Background& background) {
+  d.text(
+      {.name = kName,
+       .help = "what shows through where a picture or drawing is transparent; a dark logo needs "
+               "white",
+       .unit = "black|white|#RRGGBB",
+       .left_out = "the picture is stored as it was flattened"},
+      [&background] { return background.text(); },
+      [&background](const std::string& text) { background = Background::parse(text); });
 }
 
 namespace {

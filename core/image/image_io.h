@@ -8,9 +8,10 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/text/option_field.h"
 
 namespace lensforge {
+
+class Description;
 
 /// sRGB colour behind the transparent parts of a picture.
 struct Background {
@@ -26,7 +27,7 @@ struct Background {
 };
 
 /// The option for all commands that read pictures.
-const OptionTable<Background>& background_fields();
+void describe(Description& d, Background& background);
 
 /// A picture as read, and in plain words every change made to obtain grey linear light ("colour
 /// turned to luminance (Rec. 709)", "transparency flattened onto black", …).

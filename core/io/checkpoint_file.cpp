@@ -10,7 +10,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/text/json_text.h"
+#include "core/schema/json.h"
 
 namespace lensforge {
 namespace {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -22,9 +24,8 @@
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/outline.h"
+#include "core/schema/json.h"
 #include "core/spline/control_net.h"
-#include "core/text/json_fields.h"
-#include "core/text/json_text.h"
 
 namespace lensforge {
 namespace {
@@ -76,7 +77,7 @@ ordered_json to_json(const Lens& lens) {
       {"surface", lens_file::kSurface},
       {"grid", grid.is_grid() ? ordered_json::array({grid.columns, grid.rows}) : ordered_json()},
       {"metrics", metrics_json(lens)},
-      {"provenance", ordered_json(lens.provenance)},
+      {"provenance", ordered_json(lens.provenance.json())},
   });
   if (lens.spline) document["spline"] = lens_file::kSpline;
   if (lens.setup.outline && !lens.spline) document["sheet"] = lens_file::kSheet;
@@ -289,6 +290,11 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
 }
 
 }  // namespace
+
+Provenance::Provenance() : Provenance(json::object()) {}
+
+Provenance::Provenance(nlohmann::json object)
+    : object_(std::make_shared<const nlohmann::json>(std::move(object))) {}
 
 std::vector<SurfaceModel> models_of(const Lens& lens) {
   std::vector<SurfaceModel> models(kMeshModels.begin(), kMeshModels.end());

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <vector>
 
@@ -22,6 +22,17 @@ class PendingFiles;
 /// Metrics of a surface's picture under each model, against the target.
 using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;
 
+/// The origin of a lens: a JSON object with program, options, time and result.
+class Provenance {
+ public:
+  Provenance();
+  Provenance(nlohmann::json object);  // NOLINT: a lens's provenance is assigned as JSON.
+  [[nodiscard]] const nlohmann::json& json() const { return *object_; }
+
+ private:
+  std::shared_ptr<const nlohmann::json> object_;
+};
+
 /// A designed lens, passed from command to command.
 struct Lens {
   /// The optical surface, z ≥ thickness; mm, lens frame. It fills the lens's rectangle even if
@@ -37,7 +48,7 @@ struct Lens {
   ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
   /// With an extended source: metrics of the best picture that any surface could make.
   std::optional<ImageMetrics> source_limit;
-  nlohmann::json provenance = nlohmann::json::object();
+  Provenance provenance;
 };
 
 /// The models under which a lens's surface can be evaluated; a spline's nodes also form a mesh.

@@ -15,7 +15,7 @@
 #include "core/image/rasters.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/outline.h"
-#include "core/text/json_fields.h"
+#include "core/schema/json.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

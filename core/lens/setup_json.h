@@ -2,11 +2,11 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "core/optics/optical_setup.h"
-#include "core/text/json_fields.h"
+#include "core/schema/json.h"
 
 namespace lensforge {
 

@@ -13,9 +13,8 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/schema/json.h"
 #include "core/spline/cubic_spline.h"
-#include "core/text/json_fields.h"
-#include "core/text/json_text.h"
 
 namespace lensforge {
 namespace {

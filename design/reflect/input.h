@@ -7,7 +7,11 @@
 #include <vector>
 
 #include "core/mesh/surface_mesh.h"
-#include "core/text/option_field.h"
+#include "design/reflect/light/light_field.h"
+
+namespace lensforge {
+class Description;
+}
 
 namespace lensforge::reflect {
 
@@ -71,7 +75,7 @@ struct ReflectOptions {
 };
 
 /// All options, as the command has them.
-const OptionTable<ReflectOptions>& reflect_fields();
+void describe(Description& d, ReflectOptions& o);
 
 /// @throw InputError naming option, value and rule.
 void validate(const ReflectOptions& options);

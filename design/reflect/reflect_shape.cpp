@@ -15,7 +15,7 @@
 
 #include "core/error.h"
 #include "core/io/checkpoint_file.h"
-#include "core/text/json_fields.h"
+#include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
@@ -452,9 +452,7 @@ Eigen::Matrix3Xd taken(std::string_view& numbers, int columns, const std::filesy
 
 std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOptions& options) {
   json description = {input.fixed, input.planar, input.partner};
-  for (const OptionField<ReflectOptions>& field : reflect_fields()) {
-    if (field.left_out.empty()) description.push_back(field.stored(options));
-  }
+  append_fingerprint(description_of(options), description);
   Fnv1a hash;
   hash.add(description.dump());
   hash.add(bytes_of(entries(input.mesh.vertices)));

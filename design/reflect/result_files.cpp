@@ -20,6 +20,7 @@
 #include "core/mesh/surface_mesh.h"
 #include "core/page/drawings.h"
 #include "core/page/html_page.h"
+#include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "design/reflect/light/light_field.h"
@@ -307,10 +308,10 @@ std::string radar_section(const ReflectResult& result) {
 
 std::string option_section(const ReflectOptions& options) {
   std::vector<NamedText> facts;
-  for (const OptionField<ReflectOptions>& row : reflect_fields()) {
-    const nlohmann::json value = row.get(options);
+  for (const Field& field : description_of(options)) {
+    const nlohmann::json value = json_of(field.get());
     const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
-    if (!text.empty()) facts.push_back({row.name, text});
+    if (!text.empty()) facts.push_back({field.name, text});
   }
   const std::size_t half = (facts.size() + 1) / 2;
   const std::span<const NamedText> all(facts);
@@ -359,8 +360,8 @@ std::string convergence_text(const ReflectResult& result) {
 
 nlohmann::json options_json(const ReflectOptions& options) {
   nlohmann::json json;
-  for (const OptionField<ReflectOptions>& row : reflect_fields()) {
-    json[row.name.substr(2)] = row.get(options);
+  for (const Field& field : description_of(options)) {
+    json[field.name.substr(2)] = json_of(field.get());
   }
   return json;
 }

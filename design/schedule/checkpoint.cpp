@@ -13,8 +13,8 @@
 
 #include "core/io/checkpoint_file.h"
 #include "core/mesh/surface_mesh.h"
+#include "core/schema/json.h"
 #include "core/spline/control_net.h"
-#include "core/text/json_fields.h"
 #include "design/setup/option_tables.h"
 
 // After the header come the vertices and, if the header has scales, the reach of their steps, as
@@ -31,21 +31,14 @@ std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
   return {matrix.data(), static_cast<std::size_t>(matrix.size())};
 }
 
-/// Appends all options of a table.
-template <class Options>
-void append(const OptionTable<Options>& table, const Options& options, json& description) {
-  for (const OptionField<Options>& field : table) {
-    if (field.left_out.empty()) description.push_back(field.stored(options));
-  }
-}
-
 /// Appends the light's options that differ from the default, so that designs for the usual light
 /// keep their fingerprint.
 void append_light(const LightOptions& light, json& description) {
-  const LightOptions usual;
-  for (const OptionField<LightOptions>& field : light_fields()) {
-    const json value = field.stored(light);
-    if (value != field.stored(usual)) description.push_back({field.name, value});
+  const Description usual = description_of(LightOptions());
+  for (const Field& field : description_of(light)) {
+    const FieldValue value = field.fingerprint();
+    if (value == usual.at(field.name).fingerprint()) continue;
+    description.push_back({field.name, json_of(value)});
   }
   const SourceShape& shape = light.source_shape;
   if (!shape.is_disc()) description.push_back({shape.columns, shape.rows, shape.weights});
@@ -88,9 +81,9 @@ ConvergenceRow row_from_json(const json& j) {
 
 std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options) {
   json weights = json::array();
-  append(weight_fields(), with_smoothness_applied(options).weights, weights);
+  append_fingerprint(description_of(with_smoothness_applied(options).weights), weights);
   json description = {target.columns(), target.rows()};
-  append(design_fields(), options, description);
+  append_fingerprint(description_of(options), description);
   append_light(options.light, description);
   if (options.outline) append_outline(*options.outline, description);
   description.push_back(weights);

@@ -20,9 +20,9 @@ void require(bool rule, const std::string& option, double value, const std::stri
 }
 
 void require_all_in_range(const DesignOptions& o) {
-  require_limits(design_fields(), o);
-  require_limits(light_fields(), o.light);
-  require_limits(weight_fields(), o.weights);
+  require_limits(o);
+  require_limits(o.light);
+  require_limits(o.weights);
   require(o.focal_length > o.thickness, "--focal", o.focal_length,
           "must be above the thickness of the lens, " + number_text(o.thickness) + " mm");
   require(o.iterations >= 1, "--quality, iterations", o.iterations, "must be at least 1");

@@ -3,19 +3,20 @@
 
 #include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
-#include "core/text/option_field.h"
+#include "core/schema/description.h"
 #include "design/setup/design_options.h"
 
 namespace lensforge {
 
-/// Every option of a design except the weights, in the order in which a fingerprint stores them.
-const OptionTable<DesignOptions>& design_fields();
+/// Every option of a design except light and weights, in the order in which a fingerprint stores
+/// them.
+void describe(Description& d, DesignOptions& o);
 
 /// Options of light and screen. A fingerprint stores only those that differ from the default.
-const OptionTable<LightOptions>& light_fields();
+void describe(Description& d, LightOptions& o);
 
-/// The weights, stored like design_fields().
-const OptionTable<ObjectiveWeights>& weight_fields();
+/// The weights, stored like a design's other options.
+void describe(Description& d, ObjectiveWeights& w);
 
 /// Options of a rendering.
 struct RenderOptions {
@@ -23,8 +24,8 @@ struct RenderOptions {
   OpticalSetup setup;  ///< With a spectrum the picture is in colour.
 };
 
-/// Every option of a rendering, to be set in the table's order: setting the picture's width keeps
-/// its proportions and centre, setting its pixels keeps the proportions.
-const OptionTable<RenderOptions>& render_fields();
+/// Every option of a rendering, to be set in this order: setting the picture's width keeps its
+/// proportions and centre, setting its pixels keeps the proportions.
+void describe(Description& d, RenderOptions& o);
 
 }  // namespace lensforge

@@ -25,8 +25,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/mesh/surface_mesh.h"
-#include "core/text/json_fields.h"
-#include "core/text/json_text.h"
+#include "core/schema/json.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
 

@@ -11,9 +11,9 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/schema/toml.h"
 #include "core/text/lower_case.h"
 #include "core/text/number_text.h"
-#include "core/text/toml_fields.h"
 #include "core/text/words.h"
 
 namespace lensforge {
@@ -287,15 +287,15 @@ constexpr double kMaxRpm = 200000.0;
 constexpr std::array kBauds = {1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400};
 
 std::uint16_t word(TomlFields& fields, const std::string& key) {
-  return static_cast<std::uint16_t>(fields.whole({key, 0, 65535}));
+  return static_cast<std::uint16_t>(fields.whole(key, {0, 65535}));
 }
 
 std::uint16_t word_or(TomlFields& fields, const std::string& key, std::uint16_t otherwise) {
-  return static_cast<std::uint16_t>(fields.whole_or({key, 0, 65535}, otherwise));
+  return static_cast<std::uint16_t>(fields.whole_or(key, {0, 65535}, otherwise));
 }
 
 RegisterAddress read_address(TomlFields& fields) {
-  const RegisterAddress at{fields.whole({"function", 0, 255}), fields.whole({"address", 0, 65535})};
+  const RegisterAddress at{fields.whole("function", {0, 255}), fields.whole("address", {0, 65535})};
   if (at.function < 1 || at.function > 4) {
     fields.refuse("function",
                   "reading takes 1 (coil), 2 (discrete input), 3 (holding register) or 4 (input "
@@ -305,7 +305,7 @@ RegisterAddress read_address(TomlFields& fields) {
 }
 
 RegisterAddress write_address(TomlFields& fields) {
-  const RegisterAddress at{fields.whole({"function", 0, 255}), fields.whole({"address", 0, 65535})};
+  const RegisterAddress at{fields.whole("function", {0, 255}), fields.whole("address", {0, 65535})};
   if (at.function != 5 && at.function != 6 && at.function != 15 && at.function != 16) {
     fields.refuse("function", "writing takes 5 or 15 (coil), 6 or 16 (holding register)");
   }
@@ -322,8 +322,8 @@ ReadSignal read_signal(TomlFields& fields) {
   signal.at = read_address(fields);
   signal.mask = word_or(fields, "mask", is_bit(signal.at) ? 1 : 0xFFFF);
   if (signal.mask == 0) fields.refuse("mask", "must have at least one bit set");
-  signal.interval = fields.number({"interval", 0.01, 60.0});
-  signal.retries = fields.whole({"retries", 0, 100});
+  signal.interval = fields.number("interval", {0.01, 60.0});
+  signal.retries = fields.whole("retries", {0, 100});
   return signal;
 }
 
@@ -339,8 +339,8 @@ std::uint16_t masked_word(TomlFields& fields, const std::string& key, const Read
 SpeedScale read_scale(TomlFields& fields) {
   SpeedScale scale;
   scale.in_hertz = fields.one_of("quantity", {"hz", "rpm"}) == "hz";
-  scale.scale = fields.number({"scale", 1e-6, 1e6});
-  scale.offset = fields.number_or({"offset", -1e6, 1e6}, 0.0);
+  scale.scale = fields.number("scale", {1e-6, 1e6});
+  scale.offset = fields.number_or("offset", {-1e6, 1e6}, 0.0);
   scale.is_signed = fields.flag_or("signed", false);
   return scale;
 }
@@ -427,7 +427,7 @@ SpindleCommands read_commands(TomlFields fields, SpindleMap& spindle) {
   commands.run_forward = read_steps(fields, "run_forward");
   if (fields.has("run_reverse")) commands.run_reverse = read_steps(fields, "run_reverse");
   commands.stop = read_steps(fields, "stop");
-  commands.retries = fields.whole({"retries", 0, 100});
+  commands.retries = fields.whole("retries", {0, 100});
   fields.finish();
   return commands;
 }
@@ -459,19 +459,19 @@ void read_status(TomlFields status, SpindleMap& spindle) {
 
 SpindleMap read_spindle(TomlFields fields) {
   SpindleMap spindle;
-  spindle.rpm_min = fields.number({"rpm_min", 1.0, kMaxRpm});
-  spindle.rpm_max = fields.number({"rpm_max", 1.0, kMaxRpm});
+  spindle.rpm_min = fields.number("rpm_min", {1.0, kMaxRpm});
+  spindle.rpm_max = fields.number("rpm_max", {1.0, kMaxRpm});
   if (spindle.rpm_max < spindle.rpm_min) fields.refuse("rpm_max", "must not be below rpm_min");
-  spindle.rpm_per_hz = fields.number({"rpm_per_hz", 1.0, 1000.0});
-  spindle.tolerance = fields.number({"tolerance", 0.001, 0.5});
-  spindle.verify_reads = fields.whole({"verify_reads", 2, 100});
-  spindle.lost_reads = fields.whole({"lost_reads", 1, 100});
-  spindle.stopped_rpm = fields.number({"stopped_rpm", 0.0, 1000.0});
+  spindle.rpm_per_hz = fields.number("rpm_per_hz", {1.0, 1000.0});
+  spindle.tolerance = fields.number("tolerance", {0.001, 0.5});
+  spindle.verify_reads = fields.whole("verify_reads", {2, 100});
+  spindle.lost_reads = fields.whole("lost_reads", {1, 100});
+  spindle.stopped_rpm = fields.number("stopped_rpm", {0.0, 1000.0});
   if (spindle.stopped_rpm >= spindle.rpm_min) {
     fields.refuse("stopped_rpm", "must be below rpm_min");
   }
-  spindle.spin_up_limit = fields.number({"spin_up_limit", 0.1, 600.0});
-  spindle.spin_down_limit = fields.number({"spin_down_limit", 0.1, 600.0});
+  spindle.spin_up_limit = fields.number("spin_up_limit", {0.1, 600.0});
+  spindle.spin_down_limit = fields.number("spin_down_limit", {0.1, 600.0});
   if (fields.has("commands")) spindle.commands = read_commands(fields.table("commands"), spindle);
   read_status(fields.table("status"), spindle);
   fields.finish();
@@ -494,7 +494,7 @@ std::vector<Interlock> read_interlocks(TomlFields& root) {
 
 void read_serial(TomlFields& fields, BusTransport& transport) {
   transport.device = fields.text("device");
-  transport.baud = fields.whole({"baud", 1200, 230400});
+  transport.baud = fields.whole("baud", {1200, 230400});
   if (std::find(kBauds.begin(), kBauds.end(), transport.baud) == kBauds.end()) {
     fields.refuse("baud",
                   "must be one of 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, "
@@ -502,16 +502,16 @@ void read_serial(TomlFields& fields, BusTransport& transport) {
   }
   const std::string parity = fields.one_of("parity", {"none", "even", "odd"});
   transport.parity = parity == "none" ? 'N' : parity == "even" ? 'E' : 'O';
-  transport.stop_bits = fields.whole({"stop_bits", 1, 2});
-  transport.unit = fields.whole({"unit", 1, 247});
-  transport.late_answer_window = fields.number({"late_answer_window", 0.0, 30.0});
+  transport.stop_bits = fields.whole("stop_bits", {1, 2});
+  transport.unit = fields.whole("unit", {1, 247});
+  transport.late_answer_window = fields.number("late_answer_window", {0.0, 30.0});
 }
 
 void read_network(TomlFields& fields, BusTransport& transport) {
   transport.host = fields.text("host");
-  transport.port = fields.whole({"port", 1, 65535});
-  transport.unit = fields.whole({"unit", 0, 255});
-  transport.connect_timeout = fields.number({"connect_timeout", 0.01, 30.0});
+  transport.port = fields.whole("port", {1, 65535});
+  transport.unit = fields.whole("unit", {0, 255});
+  transport.connect_timeout = fields.number("connect_timeout", {0.01, 30.0});
 }
 
 BusTransport read_transport(TomlFields fields) {
@@ -522,22 +522,22 @@ BusTransport read_transport(TomlFields fields) {
   } else {
     read_serial(fields, transport);
   }
-  transport.response_timeout = fields.number({"response_timeout", 0.005, 30.0});
-  transport.byte_timeout = fields.number({"byte_timeout", 0.0, 5.0});
-  transport.request_gap = fields.number({"request_gap", 0.0, 1.0});
-  transport.reconnect_pause = fields.number({"reconnect_pause", 0.01, 60.0});
-  transport.reconnect_pause_max = fields.number({"reconnect_pause_max", 0.01, 60.0});
+  transport.response_timeout = fields.number("response_timeout", {0.005, 30.0});
+  transport.byte_timeout = fields.number("byte_timeout", {0.0, 5.0});
+  transport.request_gap = fields.number("request_gap", {0.0, 1.0});
+  transport.reconnect_pause = fields.number("reconnect_pause", {0.01, 60.0});
+  transport.reconnect_pause_max = fields.number("reconnect_pause_max", {0.01, 60.0});
   if (transport.reconnect_pause_max < transport.reconnect_pause) {
     fields.refuse("reconnect_pause_max", "must not be below reconnect_pause");
   }
-  transport.silence_limit = fields.number({"silence_limit", 0.05, 60.0});
+  transport.silence_limit = fields.number("silence_limit", {0.05, 60.0});
   fields.finish();
   return transport;
 }
 
 void check_protocol(TomlFields& root) {
   (void)root.one_of("format", {"lensforge.register-map"});
-  if (root.whole({"version", 0, 1e6}) != 1) root.refuse("version", "this program reads version 1");
+  if (root.whole("version", {0, 1e6}) != 1) root.refuse("version", "this program reads version 1");
   const std::string protocol = root.text("protocol");
   if (protocol.starts_with("huanyang")) root.refuse("protocol", huanyang_refusal());
   if (protocol != "modbus") root.refuse("protocol", "must be modbus");
@@ -546,8 +546,7 @@ void check_protocol(TomlFields& root) {
 }  // namespace
 
 RegisterMap parse_register_map(std::string_view text, const std::string& file) {
-  const toml::table table = parse_toml(text, file);
-  TomlFields root(table, {file, kKind});
+  TomlFields root(text, {file, kKind});
   check_protocol(root);
   RegisterMap map;
   map.name = root.text("name");

@@ -17,13 +17,13 @@ namespace {
 
 using testing::TempFolder;
 
-/// Fails for every row of a table that two structs differ in.
+/// Fails for every field that two structs differ in.
 template <class Options>
-void expect_equal(const OptionTable<Options>& table, const Options& command,
-                  const Options& library) {
-  for (const OptionField<Options>& row : table) {
-    EXPECT_EQ(row.get(command), row.get(library)) << row.name;
-    EXPECT_EQ(row.stored(command), row.stored(library)) << row.name;
+void expect_equal(const Options& command, const Options& library) {
+  const Description expected = description_of(library);
+  for (const Field& field : description_of(command)) {
+    EXPECT_EQ(field.get(), expected.at(field.name).get()) << field.name;
+    EXPECT_EQ(field.fingerprint(), expected.at(field.name).fingerprint()) << field.name;
   }
 }
 
@@ -46,9 +46,9 @@ TEST(CommandDefaults, OfDesignAreTheLibrarysForEveryModelAndPicture) {
       options.parse({"picture.png", "--out", "lens", "--model", word});
       settle(options, settings, picture, {});
       const DesignOptions library = default_design_options(model, picture);
-      expect_equal(design_fields(), settings.design, library);
-      expect_equal(light_fields(), settings.design.light, library.light);
-      expect_equal(weight_fields(), settings.design.weights, library.weights);
+      expect_equal(settings.design, library);
+      expect_equal(settings.design.light, library.light);
+      expect_equal(settings.design.weights, library.weights);
       EXPECT_EQ(library.weights.smooth, default_smoothness(model));
     }
   }
@@ -74,10 +74,8 @@ TEST(CommandDefaults, TheModelOfADesignFollowsFromItsSizeUnlessItIsGiven) {
 
 TEST(CommandDefaults, OfDesignForTheDefaultModelAreTheStructs) {
   const DesignOptions library;
-  expect_equal(design_fields(), default_design_options(library.model, Image(256, 256, 1.0F)),
-               library);
-  expect_equal(weight_fields(),
-               default_design_options(library.model, Image(256, 256, 1.0F)).weights,
+  expect_equal(default_design_options(library.model, Image(256, 256, 1.0F)), library);
+  expect_equal(default_design_options(library.model, Image(256, 256, 1.0F)).weights,
                library.weights);
 }
 
@@ -87,7 +85,7 @@ TEST(CommandDefaults, OfCamAreTheLibrarys) {
   add_cam_options(options, settings);
   options.parse({"/parts/lens"});
   settle(options, settings);
-  expect_equal(cam_fields(), settings.cam, CamOptions{});
+  expect_equal(settings.cam, CamOptions{});
   EXPECT_EQ(settings.cam.workshop, Workshop{});
   EXPECT_EQ(settings.cam.job, "lens");  // The folder's name.
 }
@@ -101,7 +99,7 @@ TEST(CommandDefaults, OfNestAreThoseOfCam) {
   settle(options, settings);
   CamOptions library;
   library.cut_outline = OutlineWish::kAlways;
-  expect_equal(cam_fields(), settings.nest.cam, library);
+  expect_equal(settings.nest.cam, library);
   EXPECT_EQ(settings.nest.blank, Eigen::Vector2d(200.0, 100.0));
   EXPECT_EQ(settings.nest.thickness, 8.0);
   EXPECT_EQ(settings.nest.gap, 0.0);
@@ -110,20 +108,20 @@ TEST(CommandDefaults, OfNestAreThoseOfCam) {
 
 TEST(CommandDefaults, OfTheOtherCommandsAreTheLibrarys) {
   const auto exported = parsed<ExportSettings>(&add_export_options, {"lens", "--out", "a.step"});
-  expect_equal(export_fields(), exported.options, ExportOptions{});
+  expect_equal(exported.options, ExportOptions{});
   const auto sent = parsed<SendSettings>(&add_send_options, {"a.ngc", "--port", "sim:grbl"});
   SendOptions library;
   library.port = "sim:grbl";
-  expect_equal(send_fields(), sent.job, library);
+  expect_equal(sent.job, library);
   const auto coupon = parsed<CouponSettings>(&add_coupon_options, {"--out", "coupon"});
-  expect_equal(coupon_fields(), coupon.coupon, CouponOptions{});
+  expect_equal(coupon.coupon, CouponOptions{});
   const auto reflected = parsed<ReflectSettings>(&add_reflect_options, {"a.stl", "--out", "a"});
-  expect_equal(reflect::reflect_fields(), reflected.reflect, reflect::ReflectOptions{});
+  expect_equal(reflected.reflect, reflect::ReflectOptions{});
   RenderOptions rendered;
   OptionSet options("render", "");
-  options.fields(render_fields(), rendered);
+  options.fields(rendered);
   options.parse({});
-  expect_equal(render_fields(), rendered, RenderOptions{});
+  expect_equal(rendered, RenderOptions{});
 }
 
 TEST(CommandDefaults, WhatIsGivenWinsOverTheWorkshop) {
@@ -152,8 +150,9 @@ TEST(CommandDefaults, AWorkshopNeedsNoToolForWhatIsLeftOut) {
   cam.workshop.process.rough.enabled = false;
   cam.workshop.process.semi.enabled = false;
   EXPECT_NO_THROW(validate(cam, OpticalSetup{}));
-  for (const OptionField<CamOptions>& row : cam_fields()) {
-    EXPECT_EQ(row.get(cam).is_null(), row.name == "--rough-tool") << row.name;
+  for (const Field& field : description_of(cam)) {
+    const bool none = std::holds_alternative<std::monostate>(field.get());
+    EXPECT_EQ(none, field.name == "--rough-tool") << field.name;
   }
 }
 

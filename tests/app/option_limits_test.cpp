@@ -21,9 +21,9 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 /// Values just outside of limits.
-std::vector<double> outside(const OptionSpec& spec) {
+std::vector<double> outside(const FieldSpec& spec) {
   const Limits& limits = spec.limits;
-  const bool whole = spec.kind == OptionKind::kWhole;
+  const bool whole = spec.kind == FieldKind::kWhole;
   std::vector<double> values;
   if (std::isfinite(limits.low)) {
     const double below = limits.low > 0.0 ? 0.5 * limits.low : limits.low - 1.0;
@@ -35,14 +35,13 @@ std::vector<double> outside(const OptionSpec& spec) {
 }
 
 /// @param line  the command with what it cannot do without.
-template <class Options>
-void expect_limits_enforced(const Arguments& line, const OptionTable<Options>& table) {
-  for (const OptionField<Options>& row : table) {
+void expect_limits_enforced(const Arguments& line, const Description& options) {
+  for (const Field& row : options) {
     if (!row.is_number()) continue;
     ASSERT_FALSE(outside(row).empty()) << row.name;
     for (const double value : outside(row)) {
       const std::string text =
-          row.kind == OptionKind::kWhole ? decimal_text(value, 0) : shortest_text(value);
+          row.kind == FieldKind::kWhole ? decimal_text(value, 0) : shortest_text(value);
       Arguments arguments = line;
       arguments.push_back(row.name + "=" + text);
       ::testing::internal::CaptureStderr();
@@ -56,72 +55,73 @@ void expect_limits_enforced(const Arguments& line, const OptionTable<Options>& t
 }
 
 TEST(OptionLimits, AreEnforcedByEveryCommandForEveryNumber) {
-  expect_limits_enforced({"design", "none.png", "--out", "none"}, design_fields());
-  expect_limits_enforced({"design", "none.png", "--out", "none"}, light_fields());
-  expect_limits_enforced({"design", "none.png", "--out", "none"}, weight_fields());
-  expect_limits_enforced({"render", "none"}, render_fields());
-  expect_limits_enforced({"cam", "none"}, cam_fields());
-  expect_limits_enforced({"nest", "none", "--blank", "100,100", "--out", "none"}, cam_fields());
-  expect_limits_enforced({"coupon", "--out", "none"}, coupon_fields());
-  expect_limits_enforced({"export", "none", "--out", "none.step"}, export_fields());
-  expect_limits_enforced({"reflect", "none.stl", "--out", "none"}, reflect::reflect_fields());
-  expect_limits_enforced({"send", "none.ngc", "--dry-run"}, send_fields());
+  const Arguments design{"design", "none.png", "--out", "none"};
+  expect_limits_enforced(design, description_of(DesignOptions()));
+  expect_limits_enforced(design, description_of(LightOptions()));
+  expect_limits_enforced(design, description_of(ObjectiveWeights()));
+  expect_limits_enforced({"render", "none"}, description_of(RenderOptions()));
+  expect_limits_enforced({"cam", "none"}, description_of(CamOptions()));
+  expect_limits_enforced({"nest", "none", "--blank", "100,100", "--out", "none"},
+                         description_of(CamOptions()));
+  expect_limits_enforced({"coupon", "--out", "none"}, description_of(CouponOptions()));
+  expect_limits_enforced({"export", "none", "--out", "none.step"}, description_of(ExportOptions()));
+  expect_limits_enforced({"reflect", "none.stl", "--out", "none"},
+                         description_of(reflect::ReflectOptions()));
+  expect_limits_enforced({"send", "none.ngc", "--dry-run"}, description_of(SendOptions()));
 }
 
 /// The library's own check refuses what the command refuses.
 /// @param usual  accepted by `check`.
 template <class Options, class Check>
-void expect_library_refuses(const OptionTable<Options>& table, const Options& usual,
-                            const Check& check) {
+void expect_library_refuses(const Options& usual, const Check& check) {
   EXPECT_NO_THROW(check(usual));
-  for (const OptionField<Options>& row : table) {
+  Options options = usual;
+  for (const Field& row : description_of(options)) {
     if (!row.is_number() || row.name == "--tool-diameter" || row.name == "--rough-tool") continue;
     for (const double value : outside(row)) {
-      Options options = usual;
-      row.set(options, row.kind == OptionKind::kWhole ? nlohmann::json(std::llround(value))
-                                                      : nlohmann::json(value));
+      row.set(row.kind == FieldKind::kWhole ? FieldValue(static_cast<int>(std::llround(value)))
+                                            : FieldValue(value));
       EXPECT_THROW(check(options), InputError) << row.name << " " << value;
     }
+    options = usual;
   }
 }
 
 TEST(OptionLimits, AreThoseOfTheLibraries) {
   const Image picture(256, 8, 0.5F);
   const auto design = [&](const DesignOptions& options) { validate(options, picture); };
-  expect_library_refuses(design_fields(), DesignOptions{}, design);
-  expect_library_refuses(light_fields(), LightOptions{}, [&](const LightOptions& light) {
+  expect_library_refuses(DesignOptions{}, design);
+  expect_library_refuses(LightOptions{}, [&](const LightOptions& light) {
     DesignOptions options;
     options.light = light;
     design(options);
   });
-  expect_library_refuses(weight_fields(), ObjectiveWeights{}, [&](const ObjectiveWeights& weights) {
+  expect_library_refuses(ObjectiveWeights{}, [&](const ObjectiveWeights& weights) {
     DesignOptions options;
     options.weights = weights;
     design(options);
   });
-  expect_library_refuses(export_fields(), ExportOptions{},
+  expect_library_refuses(ExportOptions{},
                          [](const ExportOptions& options) { validate(options, "lens.step"); });
-  expect_library_refuses(coupon_fields(), CouponOptions{},
-                         [](const CouponOptions& options) { validate(options); });
-  expect_library_refuses(
-      reflect::reflect_fields(), reflect::ReflectOptions{},
-      [](const reflect::ReflectOptions& options) { reflect::validate(options); });
+  expect_library_refuses(CouponOptions{}, [](const CouponOptions& options) { validate(options); });
+  expect_library_refuses(reflect::ReflectOptions{}, [](const reflect::ReflectOptions& options) {
+    reflect::validate(options);
+  });
   SendOptions sending;
   sending.port = "sim:grbl";
-  expect_library_refuses(send_fields(), sending,
-                         [](const SendOptions& options) { validate(options); });
-  expect_library_refuses(cam_fields(), CamOptions{},
+  expect_library_refuses(sending, [](const SendOptions& options) { validate(options); });
+  expect_library_refuses(CamOptions{},
                          [](const CamOptions& options) { validate(options, OpticalSetup{}); });
 }
 
 TEST(OptionLimits, DefaultsKeepThem) {
-  require_limits(design_fields(), DesignOptions{});
-  require_limits(light_fields(), LightOptions{});
-  require_limits(weight_fields(), ObjectiveWeights{});
-  require_limits(render_fields(), RenderOptions{});
-  require_limits(cam_fields(), CamOptions{});
-  require_limits(export_fields(), ExportOptions{});
-  require_limits(send_fields(), SendOptions{});
+  require_limits(DesignOptions{});
+  require_limits(LightOptions{});
+  require_limits(ObjectiveWeights{});
+  require_limits(RenderOptions{});
+  require_limits(CamOptions{});
+  require_limits(ExportOptions{});
+  require_limits(SendOptions{});
 }
 
 }  // namespace

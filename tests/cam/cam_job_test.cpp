@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -355,9 +356,9 @@ TEST(CamJob, TheReportNamesTheDesignThatWasCut) {
   const TempFolder folder;
   Lens lens = small_lens();
   EXPECT_EQ(run_cut(lens, programs_only(), folder).report.lens_id, "");
-  lens.provenance["fingerprint"] = "0123456789abcdef";
+  lens.provenance = nlohmann::json{{"fingerprint", "0123456789abcdef"}};
   EXPECT_EQ(run_cut(lens, programs_only(), folder).report.lens_id, "0123456789abcdef");
-  lens.provenance["fingerprint"] = "<script>";
+  lens.provenance = nlohmann::json{{"fingerprint", "<script>"}};
   EXPECT_EQ(run_cut(lens, programs_only(), folder).report.lens_id, "");
 }
 

@@ -18,9 +18,9 @@
 #include "cam/cam_meshes.h"
 #include "cam/plan/finishing.h"
 #include "core/error.h"
+#include "core/schema/description.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
-#include "core/text/toml_fields.h"
 
 namespace lensforge {
 namespace {
@@ -149,8 +149,8 @@ TEST(CutExtremes, WhatIsSmallestOrLargestOfAWorkshopCanBeStopped) {
   for (const char* key : {"finish.tolerance", "finish.slope_tolerance", "finish.pitch",
                           "process.safe_height", "stock.margin", "stock.allowance", "tool.diameter",
                           "rough.stepover", "rough.stepdown", "rough.spacing", "semi.stepover"}) {
-    const NumberRule rule = workshop_rule(key);
-    for (const double value : {rule.least, rule.most}) {
+    const Limits limits = workshop_limits(key);
+    for (const double value : {limits.low, limits.high}) {
       CamOptions extreme = options;
       Process& process = extreme.workshop.process;
       const std::string name = key;
@@ -280,7 +280,7 @@ TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {
   options.workshop.process.safe_height = 0.25;
   EXPECT_THAT(message_of<InputError>([&] { validate(options, small_lens().setup); }),
               HasSubstr("process.safe_height: 0.25: must be in 0.5 to 1000"));
-  EXPECT_EQ(workshop_rule("process.safe_height").least, kMinSafeHeight);
+  EXPECT_EQ(workshop_limits("process.safe_height").low, kMinSafeHeight);
 }
 
 }  // namespace

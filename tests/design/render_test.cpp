@@ -267,17 +267,16 @@ TEST(RenderSetup, AWidthKeepsTheImagesProportionsAndCentre) {
 
 TEST(RenderSetup, OptionsInTheTablesOrderSetTheWidthAndThenThePixels) {
   RenderOptions options{SurfaceModel::kFacet, setup_for_mesh(shifted_mesh())};
-  for (const OptionField<RenderOptions>& row : render_fields()) {
-    if (row.name == "--image-width") row.set(options, 30.0);
-    if (row.name == "--pixels") row.set(options, 60);
+  const Description fields = description_of(options);
+  for (const Field& field : fields) {
+    if (field.name == "--image-width") field.set(30.0);
+    if (field.name == "--pixels") field.set(60);
   }
   EXPECT_EQ(options.setup.image_size, Eigen::Vector2d(30.0, 20.0));
   EXPECT_EQ(options.setup.image_origin, Eigen::Vector2d(-10.5, -1.0));
   EXPECT_EQ(options.setup.pixels, Eigen::Vector2i(60, 40));
-  for (const OptionField<RenderOptions>& row : render_fields()) {
-    if (row.name != "--image-width" && row.name != "--pixels") continue;
-    EXPECT_EQ(row.get(options), row.name == "--pixels" ? 60.0 : 30.0) << row.name;
-  }
+  EXPECT_EQ(fields.at("--image-width").get(), FieldValue(30.0));
+  EXPECT_EQ(fields.at("--pixels").get(), FieldValue(60));
 }
 
 TEST(RenderSetup, TheWallLiesAboveTheSurface) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/error.h"
@@ -64,8 +65,8 @@ Lens sample_lens() {
   lens.metrics[SurfaceModel::kFacet] = {0.01, 31.5, 0.97, 0.005, 0.999};
   lens.metrics[SurfaceModel::kSmooth] = {0.0, std::numeric_limits<double>::infinity(), 1.0, 0.0,
                                          1.0};
-  lens.provenance = {
-      {"program", "lensforge 0.1.0"}, {"options", {{"rounds", 6}}}, {"seconds", 1.5}};
+  lens.provenance =
+      json{{"program", "lensforge 0.1.0"}, {"options", {{"rounds", 6}}}, {"seconds", 1.5}};
   return lens;
 }
 
@@ -94,7 +95,7 @@ TEST(Lens, ComesBackAsItWasWritten) {
   for (const SurfaceModel model : kMeshModels) {
     expect_equal(read.metrics.at(model), lens.metrics.at(model));
   }
-  EXPECT_EQ(read.provenance, lens.provenance);
+  EXPECT_EQ(read.provenance.json(), lens.provenance.json());
 }
 
 Lens spline_lens() {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/schema/description.h"
 #include "core/temp_folder.h"
 #include "fixtures/shapes/shapes.h"
 
@@ -217,16 +218,17 @@ TEST(ReflectCheckpoint, FingerprintChangesWithMeshAndOptions) {
   const ReflectOptions usual;
   const ReflectInput input = prepared_input(shapes::icosphere(1), "mesh", usual);
   std::set<std::uint64_t> seen{reflect_fingerprint(input, usual)};
-  for (const auto& row : reflect_fields()) {
-    ReflectOptions options;
-    const nlohmann::json now = row.get(options);
-    if (row.kind == OptionKind::kFlag) row.set(options, !now.get<bool>());
-    if (row.kind == OptionKind::kText) row.set(options, "x");
-    if (row.kind == OptionKind::kWord) row.set(options, row.words.back());
-    if (row.kind == OptionKind::kWhole) row.set(options, now.get<int>() + 1);
-    if (row.kind == OptionKind::kNumber) row.set(options, now.get<double>() + 1.0);
+  ReflectOptions options;
+  for (const Field& field : description_of(options)) {
+    const FieldValue now = field.get();
+    if (field.kind == FieldKind::kFlag) field.set(!std::get<bool>(now));
+    if (field.kind == FieldKind::kText) field.set("x");
+    if (field.kind == FieldKind::kWord) field.set(field.words.back());
+    if (field.kind == FieldKind::kWhole) field.set(std::get<int>(now) + 1);
+    if (field.kind == FieldKind::kNumber) field.set(std::get<double>(now) + 1.0);
     const bool is_new = seen.insert(reflect_fingerprint(input, options)).second;
-    EXPECT_EQ(is_new, row.left_out.empty()) << row.name;
+    EXPECT_EQ(is_new, field.left_out.empty()) << field.name;
+    field.set(now);
   }
   ReflectInput fixed = input;
   fixed.fixed.assign(static_cast<std::size_t>(input.mesh.vertex_count()), 1);

@@ -197,41 +197,34 @@ TEST(Checkpoint, AFolderThatDoesNotExistIsARunError) {
   message_of<RunError>([&] { write_checkpoint(sample(), folder / "no" / "such" / "place"); });
 }
 
-/// A value within a row's limits that differs from the current one.
-template <class Options>
-nlohmann::json other_value(const OptionField<Options>& row, const Options& options) {
-  const nlohmann::json value = row.get(options);
-  if (row.kind == OptionKind::kFlag) return !value.template get<bool>();
-  if (row.kind == OptionKind::kWord) {
-    return row.words.front() == value ? row.words.back() : row.words.front();
+/// Another value than the one that a field has, within its limits.
+FieldValue other_value(const Field& field) {
+  const FieldValue value = field.get();
+  if (field.kind == FieldKind::kFlag) return !std::get<bool>(value);
+  if (field.kind == FieldKind::kWord) {
+    return FieldValue(field.words.front()) == value ? field.words.back() : field.words.front();
   }
-  if (row.name == "--front") return "sphere:3000";
-  if (row.name == "--wavelengths") return "450,650";
-  if (row.kind == OptionKind::kText) return row.unit == "X,Y,Z" ? "1,2,-3" : "1,2";
-  const double now = value.template get<double>();
-  const double next = row.kind == OptionKind::kWhole ? now + 1.0 : 1.01 * now + 0.001;
-  EXPECT_TRUE(row.limits.hold(next)) << row.name;
-  return row.kind == OptionKind::kWhole ? nlohmann::json(static_cast<int>(next))
-                                        : nlohmann::json(next);
+  if (field.name == "--front") return "sphere:3000";
+  if (field.name == "--wavelengths") return "450,650";
+  if (field.kind == FieldKind::kText) return field.unit == "X,Y,Z" ? "1,2,-3" : "1,2";
+  const double now = number_of(value);
+  const double next = field.kind == FieldKind::kWhole ? now + 1.0 : 1.01 * now + 0.001;
+  EXPECT_TRUE(field.limits.hold(next)) << field.name;
+  return field.kind == FieldKind::kWhole ? FieldValue(static_cast<int>(next)) : FieldValue(next);
 }
 
 TEST(DesignFingerprint, ChangesWithEveryOption) {
   const Image picture = testing::spot_picture(12, 9);
   std::set<std::uint64_t> seen{design_fingerprint(picture, {})};
-  for (const auto& row : design_fields()) {
-    DesignOptions options;
-    row.set(options, other_value(row, options));
-    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
-  }
-  for (const auto& row : light_fields()) {
-    DesignOptions options;
-    row.set(options.light, other_value(row, options.light));
-    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
-  }
-  for (const auto& row : weight_fields()) {
-    DesignOptions options;
-    row.set(options.weights, other_value(row, options.weights));
-    EXPECT_TRUE(seen.insert(design_fingerprint(picture, options)).second) << row.name;
+  DesignOptions changed;
+  Description all = description_of(changed);
+  all.add(description_of(changed.light));
+  all.add(description_of(changed.weights));
+  for (const Field& field : all) {
+    const DesignOptions before = changed;
+    field.set(other_value(field));
+    EXPECT_TRUE(seen.insert(design_fingerprint(picture, changed)).second) << field.name;
+    changed = before;
   }
   DesignOptions options;
   options.iterations = 61;  // That no word of --quality stands for.
@@ -260,8 +253,9 @@ TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
   // Weights and light have tables of their own, the process comes from a workshop, the outline may
   // come from a file; checkpoint and resume do not change the result.
   constexpr std::size_t kWithoutRow = 6;
-  EXPECT_EQ(design_fields().size() + kWithoutRow, testing::member_count<DesignOptions>());
-  EXPECT_EQ(weight_fields().size(), testing::member_count<ObjectiveWeights>());
+  EXPECT_EQ(description_of(DesignOptions()).size() + kWithoutRow,
+            testing::member_count<DesignOptions>());
+  EXPECT_EQ(description_of(ObjectiveWeights()).size(), testing::member_count<ObjectiveWeights>());
 }
 
 TEST(DesignFingerprint, IsThatOfEarlierVersions) {

@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "core/full_disk.h"

@@ -2,10 +2,27 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <nlohmann/json.hpp>
+#include <cstddef>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
+
+#include "core/schema/description.h"
 
 namespace lensforge {
+
+/// Maximum nesting depth of a JSON document.
+inline constexpr int kMaxJsonDepth = 64;
+
+/// Parses a JSON document strictly.
+/// @param name  the file's name in messages.
+/// @throw InputError "name: is no JSON: …" naming the byte, or that a number is beyond the range of
+///        doubles, that a name is repeated in an object or that it is nested too deeply; in short
+///        words of our own, never the library's.
+nlohmann::json parse_json(std::string_view text, const std::string& name);
+
+/// A field's value; null if it has none.
+nlohmann::json json_of(const FieldValue& value);
 
 /// Typed access to the fields of a JSON object; every refusal is an InputError that names the file
 /// and the field, e.g. "lens.json: field 'source.type' is missing". Fields that are not read are
@@ -20,9 +37,12 @@ class JsonFields {
   [[nodiscard]] bool has(const std::string& name) const;
   [[nodiscard]] const nlohmann::json& at(const std::string& name) const;
   [[nodiscard]] JsonFields object(const std::string& name) const;
+  /// An object in a list. @pre the list has so many.
+  [[nodiscard]] JsonFields item(const std::string& name, std::size_t index) const;
   [[nodiscard]] std::string text(const std::string& name) const;
   [[nodiscard]] double number(const std::string& name) const;
   [[nodiscard]] int integer(const std::string& name) const;
+  [[nodiscard]] bool flag(const std::string& name) const;
   [[nodiscard]] Eigen::Vector2d number_pair(const std::string& name) const;
   [[nodiscard]] Eigen::Vector3d number_triple(const std::string& name) const;
   [[nodiscard]] Eigen::Vector2i integer_pair(const std::string& name) const;
@@ -35,5 +55,16 @@ class JsonFields {
   std::string file_;
   std::string prefix_;
 };
+
+/// A described object, its fields in the description's order. Numbers that 0 stands for are left
+/// out.
+nlohmann::ordered_json json_of(const Description& description);
+
+/// Reads it back: a field that is not needed keeps its value if it is missing. @throw InputError
+/// naming file, field, value and rule.
+void read_json(const Description& description, const JsonFields& fields);
+
+/// Appends the values that a fingerprint holds to an array.
+void append_fingerprint(const Description& description, nlohmann::json& array);
 
 }  // namespace lensforge
