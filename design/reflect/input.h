@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/mesh/surface_mesh.h"
-#include "design/reflect/light/light_field.h"
 
 namespace lensforge {
 class Description;
