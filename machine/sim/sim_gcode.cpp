@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "machine/sim/sim_settings.h"
+#include "machine/sim/sim_firmware.h"
 
 namespace lensforge {
 namespace {

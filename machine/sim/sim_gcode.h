@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "machine/sim/sim_firmware.h"
 #include "machine/sim/sim_queue.h"
-#include "machine/sim/sim_settings.h"
 
 namespace lensforge {
 

@@ -6,7 +6,7 @@
 #include <deque>
 #include <functional>
 
-#include "machine/sim/sim_settings.h"
+#include "machine/sim/sim_firmware.h"
 
 namespace lensforge {
 

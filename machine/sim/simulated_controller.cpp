@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "machine/sim/sim_settings.h"
+#include "machine/sim/sim_firmware.h"
 
 namespace lensforge {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "machine/gcode/gcode_motion.h"
-#include "machine/sim/sim_settings.h"
+#include "machine/sim/sim_firmware.h"
 
 namespace lensforge::campaign {
 

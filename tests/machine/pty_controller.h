@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "core/io/files.h"
-#include "machine/sim/sim_settings.h"
+#include "machine/sim/sim_firmware.h"
 
 namespace lensforge {
 
