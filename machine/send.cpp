@@ -19,7 +19,7 @@
 #include "core/text/words.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/program_seal.h"
-#include "machine/guard/background_guard.h"
+#include "machine/guard/spindle_guard.h"
 #include "machine/link/link.h"
 #include "machine/sim/simulated_machine.h"
 #include "machine/stream/session.h"

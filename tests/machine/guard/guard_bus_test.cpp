@@ -9,9 +9,9 @@
 #include <optional>
 #include <thread>
 
-#include "machine/guard/background_guard.h"
 #include "machine/guard/modbus_bus.h"
 #include "machine/guard/register_map.h"
+#include "machine/guard/spindle_guard.h"
 #include "machine/guard_server.h"
 #include "machine/link/link.h"
 
