@@ -22,7 +22,7 @@
 #include "machine/guard/spindle_guard.h"
 #include "machine/link/link.h"
 #include "machine/sim/simulated_machine.h"
-#include "machine/stream/session.h"
+#include "machine/stream/controller_dialogue.h"
 
 namespace lensforge {
 namespace {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <istream>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -10,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/compute/executor.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/gcode_motion.h"
 #include "machine/link/link.h"
@@ -159,5 +161,33 @@ bool at_rest(const StatusReport& report);
 /// Reads build, settings and coordinate systems. @pre the controller is idle or in alarm. @throw
 /// StreamFault; InputError if it is not of the Grbl family.
 ControllerInfo learn_controller(Dialogue& dialogue, const std::string& banner);
+
+/// Options for taking over a controller.
+struct SessionOptions {
+  /// After a fault: hold and reset a machine that moves or is in a hold.
+  bool resume = false;
+  bool home = false;  ///< Run the homing cycle.
+  /// Limit for the first answer, s: boards that restart when the port is opened take two seconds. A
+  /// silent board is detected within 3 s, also with homing.
+  double wake_timeout = 2.4;
+  double home_timeout = 300.0;
+};
+
+/// Takes over a controller: waits for it, soft-resets it (which keeps the position if nothing
+/// moves, and drops a partial line of an earlier sender), homes if requested, and reads its
+/// properties.
+/// @throw InputError if it moves, is held or has its door open; StreamFault; LinkLost
+ControllerInfo open_session(Wire& wire, Clock& clock, const SessionOptions& options,
+                            const std::stop_token& stop);
+
+/// Time from a line to its ok, s: the median of several empty lines. @throw StreamFault
+double measure_round_trip(Wire& wire, Clock& clock, const std::stop_token& stop);
+
+/// Lets the controller check every line without moving ($C). However the check ends, the controller
+/// then is out of check mode and reset. @return number of lines checked. @throw StreamFault naming
+/// the line, or the part that does not answer; GcodeError; LinkLost, after which it may still be in
+/// check mode
+std::int64_t check_on_controller(Wire& wire, Clock& clock, std::istream& program,
+                                 const ControllerInfo& info, const RunControl& control);
 
 }  // namespace lensforge

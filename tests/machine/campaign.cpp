@@ -21,12 +21,12 @@
 #include "machine/sim_talk.h"
 #include "machine/simulated_spindle.h"
 #include "machine/spy_link.h"
+#include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/program_facts.h"
 #include "machine/stream/program_file.h"
 #include "machine/stream/resume_plan.h"
 #include "machine/stream/sender.h"
-#include "machine/stream/session.h"
 
 namespace lensforge::campaign {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/stream/session.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,6 +12,7 @@
 #include "core/temp_folder.h"
 #include "machine/gcode/gcode_reader.h"
 #include "machine/sim_talk.h"
+#include "machine/stream/controller_dialogue.h"
 
 namespace lensforge {
 namespace {
