@@ -7,7 +7,6 @@
 #include "app/frame/common_output.h"
 #include "app/frame/option_set.h"
 #include "app/view/lens_view.h"
-#include "app/view/view_page.h"
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"

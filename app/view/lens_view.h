@@ -93,4 +93,8 @@ LensView view_of_lens(const Lens& lens, const std::string& name, const Executor&
 LensView read_view(const std::filesystem::path& folder, const Executor& executor,
                    const RunControl& control);
 
+/// Returns the page that shows a lens: one self-contained HTML file that computes the projected
+/// picture itself.
+std::string view_page(const LensView& view);
+
 }  // namespace lensforge

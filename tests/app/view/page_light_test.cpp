@@ -10,7 +10,6 @@
 
 #include "app/view/browser.h"
 #include "app/view/lens_view.h"
-#include "app/view/view_page.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
