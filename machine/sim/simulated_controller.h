@@ -24,7 +24,7 @@ struct Spoken {
 /// commands, line parser, planner, motion, alarms and reports, as documented for Grbl 1.1 and
 /// grblHAL. Memory does not grow with the program.
 ///
-/// Its decisions are pure functions: sim_state.h (bytes to lines, machine states, reports) and
+/// Its decisions are pure functions: sim_firmware.h (bytes to lines, machine states, reports) and
 /// sim_gcode.h (lines to actions). This class carries them out.
 ///
 /// It tracks the mill's true position as well as the controller's: a reset in motion, a hard stop
