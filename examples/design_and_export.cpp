@@ -3,11 +3,10 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "core/picture.h"
 #include "core/lens.h"
+#include "core/picture.h"
 #include "design/design.h"
-#include "export/files/closed_solid.h"
-#include "export/files/mesh_formats.h"
+#include "export/export.h"
 
 int main(int argc, char** argv) try {
   if (argc != 3) throw std::invalid_argument("usage: design_and_export PICTURE FOLDER");
@@ -22,8 +21,8 @@ int main(int argc, char** argv) try {
 
   std::filesystem::create_directories(folder);
   lensforge::write_lens(design.lens, folder);
-  const auto solid = lensforge::closed_solid(design.lens.surface, "the designed surface");
-  lensforge::write_stl(solid, "lens", folder / "lens.stl");
+  lensforge::export_lens({design.lens, folder}, folder / "lens.stl", {},
+                         lensforge::Executor::cpu());
   std::cout << "MAE " << design.lens.metrics.at(design.lens.model).mae << '\n';
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';
