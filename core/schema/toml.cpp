@@ -350,8 +350,10 @@ std::string tables_text(const Description& description, const std::string& prefi
       const bool list = field.kind == FieldKind::kList;
       std::string introduction = field.help.empty() ? "" : "# " + field.help + "\n";
       for (const Description& part : field.parts()) {
-        text += "\n" + std::exchange(introduction, "") + (list ? "[[" : "[") + prefix + field.name +
-                (list ? "]]\n" : "]\n") + tables_text(part, prefix + field.name + ".");
+        text += '\n';
+        text += std::exchange(introduction, "");
+        text += (list ? "[[" : "[") + prefix + field.name + (list ? "]]\n" : "]\n");
+        text += tables_text(part, prefix + field.name + ".");
       }
       continue;
     }
