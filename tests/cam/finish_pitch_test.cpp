@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "cam/cam_meshes.h"
@@ -88,7 +89,8 @@ TEST(FinishPitch, OfAnUnknownSurfaceIsThatOfALevelOneOfTheLensesSize) {
 std::vector<std::string> warnings_of(Lens lens, CamOptions options, double designed) {
   const TempFolder folder;
   options.render = false;
-  lens.provenance = {{"made_by", {{"pitch_mm", designed}, {"polish_sigma_mm", 0.02}}}};
+  lens.provenance =
+      nlohmann::json{{"made_by", {{"pitch_mm", designed}, {"polish_sigma_mm", 0.02}}}};
   std::vector<std::string> warnings = testing::run_cut(lens, options, folder).report.warnings;
   std::erase_if(warnings, [](const std::string& text) {
     return text.find("was designed for") == std::string::npos;
