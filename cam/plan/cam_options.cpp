@@ -19,6 +19,10 @@
 namespace lensforge {
 namespace {
 
+/// Samples per finishing row. Not a whole number: samples that hit every row at the same places all
+/// err alike, by 4.5 % of the leakage at a pitch of 0.07 mm.
+constexpr double kSamplesPerRow = 6.1;
+
 /// Maximum ratio of the sample spacing along the passes to that across them.
 constexpr double kAlongPasses = 3.0;
 
@@ -169,7 +173,7 @@ Eigen::Vector2d size_to_cut(const CamOptions& options, const OpticalSetup& setup
 
 double sample_spacing(const CamOptions& options, const Passes& passes) {
   if (options.sample_spacing > 0.0) return options.sample_spacing;
-  return std::clamp(std::max(passes.pitch / 6.0, options.workshop.polish.sigma / 3.0),
+  return std::clamp(std::max(passes.pitch / kSamplesPerRow, options.workshop.polish.sigma / 3.0),
                     cam_limit::kFinestSample, cam_limit::kCoarsestSample);
 }
 
