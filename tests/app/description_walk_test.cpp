@@ -136,9 +136,13 @@ void expect_command_line_sets() {
     const Description fields = description_of(options);
     const Field& field = *(fields.begin() + static_cast<std::ptrdiff_t>(i));
     if (field.kind == FieldKind::kText) continue;
+    const FieldValue before = field.get();
     const FieldValue wanted = other_value(field);
     output_of(fields, {word_of(field, wanted)});
-    EXPECT_EQ(field.get(), wanted) << field.name;
+    const FieldValue parsed = field.get();
+    EXPECT_NE(parsed, before) << field.name;
+    field.set(wanted);  // A size is kept in whole bytes.
+    EXPECT_EQ(parsed, field.get()) << field.name;
   }
 }
 
