@@ -61,7 +61,7 @@ TEST(FinishPitch, IsTheSameInProgramsReportAndSamples) {
   const double rows = std::ceil(2.0 * std::hypot(1.0, kSlope) / kOnPlane);
   EXPECT_NEAR(cut, 2.0 / rows, 1e-12);
   EXPECT_EQ(parameter(report, "Stepover"), decimal_text(cut, 4) + " mm");
-  EXPECT_THAT(parameter(report, "Sampled every"), HasSubstr(decimal_text(cut / 6.0, 4) + " mm"));
+  EXPECT_THAT(parameter(report, "Sampled every"), HasSubstr(decimal_text(cut / 6.1, 4) + " mm"));
 }
 
 /// Two balls blend on the rows that the programs have.
