@@ -32,6 +32,7 @@
 #include "core/page/html_page.h"
 #include "core/spline/control_net.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/render.h"
 #include "design/schedule/checkpoint.h"
 #include "view_files.h"

@@ -19,6 +19,7 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 // Every part is planned on its own blank. On a shared one that is its rectangle and a margin so
 // wide that no roughing breaks out of it, at the height of the common blank: the parts' blanks
@@ -208,9 +209,7 @@ std::optional<Prediction> predict(PlannedPart& part, const PartPrograms& program
 
 std::string names_of(const std::vector<fs::path>& paths) {
   std::string names;
-  for (const fs::path& path : paths) {
-    names += (names.empty() ? "" : ", ") + path.filename().string();
-  }
+  for (const fs::path& path : paths) names = with_word(names, path.filename().string());
   return names;
 }
 

@@ -16,6 +16,7 @@
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -243,7 +244,7 @@ std::string files_of(const ProgramFiles& programs, std::size_t operation) {
     const bool holds =
         std::any_of(file.operations.begin(), file.operations.end(),
                     [&](const OperationTime& time) { return time.operation == operation; });
-    if (holds) names += (names.empty() ? "" : ", ") + file.path.filename().string();
+    if (holds) names = with_word(names, file.path.filename().string());
   }
   return names;
 }

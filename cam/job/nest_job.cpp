@@ -24,6 +24,7 @@
 #include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -8,6 +8,7 @@
 #include "cam/path/rough.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -29,6 +29,7 @@
 #include "core/optics/outline.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -13,6 +13,7 @@
 #include "cam/report/verdict.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 #include "report_page.h"
 
 namespace lensforge::report_section {

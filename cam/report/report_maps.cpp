@@ -11,6 +11,7 @@
 #include "core/page/html_page.h"
 #include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 

@@ -16,6 +16,7 @@
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

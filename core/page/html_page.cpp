@@ -13,6 +13,7 @@
 #include "core/image/image_io.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "page_files.h"
 
 namespace lensforge {
@@ -50,12 +51,6 @@ std::string element(std::string_view tag, std::string_view attributes, std::stri
   text.append(tag);
   if (!attributes.empty()) text.append(" ").append(attributes);
   return text.append(">").append(html).append("</").append(tag).append(">");
-}
-
-std::string joined(std::initializer_list<std::string_view> texts) {
-  std::string all;
-  for (const std::string_view text : texts) all.append(text);
-  return all;
 }
 
 std::string html_table(std::span<const TableColumn> columns,

@@ -23,9 +23,6 @@ std::string escape_html(std::string_view text);
 /// <tag attributes>html</tag>. @param attributes  HTML, without the leading space.
 std::string element(std::string_view tag, std::string_view attributes, std::string_view html);
 
-/// Concatenates the texts.
-std::string joined(std::initializer_list<std::string_view> texts);
-
 /// A column of a table: heading (text), and true for numbers.
 struct TableColumn {
   std::string heading;

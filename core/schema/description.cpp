@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 
@@ -32,9 +33,7 @@ void FieldSpec::require(const std::string& text, double value) const {
 
 void FieldSpec::require_word(const std::string& text) const {
   if (std::find(words.begin(), words.end(), text) != words.end()) return;
-  std::string known;
-  for (const std::string& word : words) known += (known.empty() ? "" : ", ") + word;
-  throw InputError(name + " " + text + ": must be one of " + known);
+  throw InputError(name + " " + text + ": must be one of " + joined(words, ", "));
 }
 
 namespace {

@@ -14,6 +14,7 @@
 #include "core/schema/toml_document.h"
 #include "core/text/number_text.h"
 #include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -224,12 +225,8 @@ std::vector<std::string> TomlFields::texts(const std::string& key) {
 
 std::string TomlFields::one_of(const std::string& key, const std::vector<std::string>& words) {
   std::string value = text(key);
-  std::string list;
-  for (const std::string& word : words) {
-    if (value == word) return value;
-    list += (list.empty() ? "" : ", ") + word;
-  }
-  refuse(key, "must be one of: " + list);
+  if (std::find(words.begin(), words.end(), value) != words.end()) return value;
+  refuse(key, "must be one of: " + joined(words, ", "));
 }
 
 double TomlFields::number(const std::string& key, const Limits& limits) {

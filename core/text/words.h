@@ -2,11 +2,19 @@
 #pragma once
 
 #include <cstddef>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace lensforge {
+
+/// Concatenates the texts.
+inline std::string joined(std::initializer_list<std::string_view> texts) {
+  std::string all;
+  for (const std::string_view text : texts) all.append(text);
+  return all;
+}
 
 /// The words of a range with `between` between them. @param words  strings or views of them.
 template <class Words>

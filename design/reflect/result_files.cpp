@@ -23,6 +23,7 @@
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"

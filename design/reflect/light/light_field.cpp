@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/text/number_list.h"
+#include "core/text/words.h"
 #include "design/reflect/input.h"
 #include "design/reflect/mesh/faces.h"
 
@@ -94,18 +95,8 @@ constexpr int kEvaluationSun = 96;
 constexpr int kColumnsPerRow = 6;
 constexpr double kGoldenShare = 0.6180339887498949;
 
-std::vector<std::string_view> split_at(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const std::size_t end = text.find(separator);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
 Eigen::Matrix3Xd listed_lights(const std::string& text) {
-  const std::vector<std::string_view> parts = split_at(text, ';');
+  const std::vector<std::string_view> parts = split(text, ';');
   Eigen::Matrix3Xd lights(3, static_cast<Eigen::Index>(parts.size()));
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const Eigen::VectorXd light = number_list("--light", std::string(parts[i]), 3);

@@ -16,6 +16,7 @@
 #include "cam/report/verdict.h"
 #include "core/error.h"
 #include "core/page/html_page.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

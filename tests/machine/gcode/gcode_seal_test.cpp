@@ -10,18 +10,13 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/temp_folder.h"
+#include "core/text/words.h"
 #include "machine/gcode/program_seal.h"
 
 namespace lensforge {
 namespace {
 
 /// GCC 12 warns falsely (-Wrestrict) of a literal + a string.
-std::string joined(std::initializer_list<std::string_view> parts) {
-  std::string text;
-  for (const std::string_view part : parts) text += part;
-  return text;
-}
-
 using lensforge::testing::TempFolder;
 using lensforge::testing::write_bytes;
 
