@@ -105,7 +105,9 @@ void require_done(const Command& command, const fs::path& folder) {
 /// Keeps the first checkpoint that a command writes, below `folder`.
 void take_checkpoint(const Command& command, const fs::path& folder, const fs::path& checkpoint) {
   Child child(command, folder, folder / ".record");
-  for (int i = 0; i < 10'000 && !fs::exists(folder / checkpoint); ++i) {
+  const auto end =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(kMaxPreparation);
+  while (!fs::exists(folder / checkpoint) && std::chrono::steady_clock::now() < end) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   fs::create_directories(folder / "partial");

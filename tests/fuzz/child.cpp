@@ -26,12 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kPoll{1};
-/// Of commands that prepare something, s; sanitizers slow them down several times.
-#ifdef __SANITIZE_ADDRESS__
-constexpr double kLongestRun = 600.0;
-#else
-constexpr double kLongestRun = 60.0;
-#endif
 
 void limit(int what, rlim_t value) {
   const rlimit limits{value, value};
@@ -165,7 +159,7 @@ Ending Child::wait(double budget, int signal) {
 }
 
 Ending run_to_end(const Command& command, const fs::path& folder, const fs::path& record) {
-  return Child(command, folder, record).wait(kLongestRun, SIGTERM);
+  return Child(command, folder, record).wait(kMaxPreparation, SIGTERM);
 }
 
 }  // namespace lensforge::fuzz

@@ -75,7 +75,14 @@ class Child {
 /// Seconds from a signal to the end; the commands' own goal is 1.
 inline constexpr double kMaxStop = 5.0;
 
-/// Start to end, 60 s at most.
+/// Seconds that a command may take to prepare something; sanitizers slow it down several times.
+#ifdef __SANITIZE_ADDRESS__
+inline constexpr double kMaxPreparation = 600.0;
+#else
+inline constexpr double kMaxPreparation = 60.0;
+#endif
+
+/// Start to end, kMaxPreparation at most.
 Ending run_to_end(const Command& command, const std::filesystem::path& folder,
                   const std::filesystem::path& record);
 
