@@ -40,7 +40,7 @@ enum class SourceKind { kParallel, kPoint };
 
 /// Light source, kind of surface (lens or mirror), and place of the picture.
 struct LightOptions {
-  LightMode mode = LightMode::kRefract;
+  Body body;               ///< Lens or mirror.
   double incidence = 0.0;  ///< Angle of parallel light from a mirror's z axis, degrees, in x.
   SourceKind source = SourceKind::kParallel;
   std::optional<double> front_radius;                 ///< Radius, mm; above 0: convex; none: flat.
