@@ -27,8 +27,8 @@ namespace {
 using std::chrono::steady_clock;
 
 /// Limits per call: MPI counts in int.
-constexpr std::size_t kMostBytes = std::size_t{1} << 30;
-constexpr std::size_t kMostWords = std::size_t{1} << 27;
+constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
+constexpr std::size_t kMaxWords = std::size_t{1} << 27;
 
 /// Sleep of a rank without work between two checks; the work then takes far longer.
 constexpr std::chrono::microseconds kNap{200};
@@ -110,7 +110,7 @@ Ranks Ranks::world() {
 void Ranks::broadcast_bytes(void* data, std::size_t bytes, int from) const {
   const CountedCall call(rank_ == from ? bytes : 0);
   auto* const first = static_cast<char*>(data);
-  in_parts(bytes, kMostBytes, [&](std::size_t begin, int length) {
+  in_parts(bytes, kMaxBytes, [&](std::size_t begin, int length) {
     MPI_Bcast(first + begin, length, MPI_BYTE, from, MPI_COMM_WORLD);
   });
 }
@@ -128,7 +128,7 @@ void Ranks::await_bytes(void* data, std::size_t bytes) const {
 
 void Ranks::add_up(std::span<std::uint64_t> entries) const {
   const CountedCall call(entries.size_bytes());
-  in_parts(entries.size(), kMostWords, [&](std::size_t begin, int length) {
+  in_parts(entries.size(), kMaxWords, [&](std::size_t begin, int length) {
     MPI_Allreduce(MPI_IN_PLACE, entries.data() + begin, length, MPI_UINT64_T, MPI_SUM,
                   MPI_COMM_WORLD);
   });
@@ -156,14 +156,14 @@ void Ranks::collect_parts(std::span<double> entries, std::span<const int> counts
 void Ranks::send_bytes(int to, const void* data, std::size_t bytes) const {
   const CountedCall call(bytes);
   const auto* const first = static_cast<const char*>(data);
-  in_parts(bytes, kMostBytes, [&](std::size_t begin, int length) {
+  in_parts(bytes, kMaxBytes, [&](std::size_t begin, int length) {
     MPI_Send(first + begin, length, MPI_BYTE, to, kTag, MPI_COMM_WORLD);
   });
 }
 
 void Ranks::receive_bytes(int from, void* data, std::size_t bytes) const {
   auto* const first = static_cast<char*>(data);
-  in_parts(bytes, kMostBytes, [&](std::size_t begin, int length) {
+  in_parts(bytes, kMaxBytes, [&](std::size_t begin, int length) {
     MPI_Recv(first + begin, length, MPI_BYTE, from, kTag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
   });
 }

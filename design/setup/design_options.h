@@ -159,7 +159,7 @@ void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels);
 
 /// Minimum share of the lens's rectangle that an outline covers: below it nearly the whole mesh is
 /// dark.
-inline constexpr double kLeastOutlineShare = 0.05;
+inline constexpr double kMinOutlineShare = 0.05;
 
 /// Pixels of the longer side at which an SVG file is drawn to find its outline.
 inline constexpr int kOutlineDrawing = 2048;

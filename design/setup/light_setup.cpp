@@ -39,7 +39,7 @@ constexpr double kMilliradian = 1e-3;
 constexpr double kMaxBlur = 0.5;
 
 /// End of the search for a narrower source: a source of a kilometre becomes one of a micron.
-constexpr double kLeastShare = 1e-9;
+constexpr double kMinShare = 1e-9;
 
 std::string angle_text(double mrad) { return "--source-angle " + number_text(mrad); }
 std::string size_text(double mm) { return "--source-size " + number_text(mm) + "mm"; }
@@ -123,7 +123,7 @@ void require_source_extent(const DesignOptions& options, const OpticalSetup& set
   do {
     share *= 0.9;
     narrower.extent.width = share * setup.extent.width;
-  } while (share > kLeastShare && !allows(narrower, options.thickness));
+  } while (share > kMinShare && !allows(narrower, options.thickness));
   refuse(width_text(options.light),
          "the light of each point of the lens must cover at most half of the picture; " +
              narrower_text(options.light, share) + " would do");
@@ -136,8 +136,8 @@ void require_source_extent(const DesignOptions& options, const OpticalSetup& set
 constexpr double kStartRise = 2.0;
 
 /// Limits of the number of cells each way on which a height map is checked.
-constexpr int kFewestCells = 16;
-constexpr int kMostCells = 128;
+constexpr int kMinCells = 16;
+constexpr int kMaxCells = 128;
 
 bool works_at(const OpticalSetup& setup, const LightPath& light, const Eigen::Vector3d& p) {
   const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
@@ -191,7 +191,7 @@ void require_height_map(const OpticalSetup& setup, double thickness, const std::
            "--thickness would do");
   }
   const HeightGrid& grid = spline.grid();
-  const int cells = std::clamp(std::max(grid.columns, grid.rows) - 1, kFewestCells, kMostCells);
+  const int cells = std::clamp(std::max(grid.columns, grid.rows) - 1, kMinCells, kMaxCells);
   if (fault == FrontFault::kUnlit || !start_works(setup, thickness, depth, cells)) {
     refuse(given,
            "is too steep: light passes a part of it by, or is reflected totally behind it; "
@@ -210,7 +210,7 @@ constexpr double kUsualIncidence = 30.0;
 
 /// Minimum width of the picture in lens widths: at a hundredth two thirds of a draft's light are on
 /// the picture (16² portrait), at a hundred-thousandth none.
-constexpr double kLeastMagnification = 0.01;
+constexpr double kMinMagnification = 0.01;
 
 std::string text_of(const Eigen::Vector3d& v) { return numbers_text(std::span(v.data(), 3)); }
 std::string text_of(const Eigen::Vector2d& v) { return numbers_text(std::span(v.data(), 2)); }
@@ -375,7 +375,7 @@ void require_picture(const DesignOptions& o) {
     refuse("--image-offset " + text_of(offset),
            "must be at most " + number_text(kMaxImageWidth) + " mm; 0,0 would do");
   }
-  const double least = kLeastMagnification * o.width;
+  const double least = kMinMagnification * o.width;
   if (o.light.image_width > 0.0 && o.light.image_width < least) {
     refuse(
         "--image-width " + number_text(o.light.image_width),
