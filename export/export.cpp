@@ -215,7 +215,7 @@ PictureGoal goal_of(const WantedPicture& wanted, const OpticalSetup& setup) {
     WantedPicture::Comparison found = wanted.compare(solid.mesh, solid.normals);
     return PictureMiss{found.excess, std::move(found.missing)};
   };
-  if (setup.point || setup.front) {
+  if (LightPath(setup).varies()) {
     goal.stretch = [&wanted](const Eigen::Vector3d& p, const Eigen::Vector2d& slope,
                              const Eigen::Matrix2d& bend) {
       return wanted.stretch(p, slope, bend);
@@ -301,8 +301,8 @@ void write_scene(const Job& job, const SampledSurface& surface, const SurfaceMes
                 .surface_triangles = triangles,
                 .curved_back = lens.setup.front ? triangles : 0,
                 .ior = lens.setup.ior,
-                .mirror = lens.setup.mode == LightMode::kReflect};
-  write_glb(part, part.mirror ? "mirror" : "lens", job.out);
+                .mirror = !traits(lens.setup.body).transmits};
+  write_glb(part, traits(lens.setup.body).name, job.out);
 }
 
 MeshSolid write_mesh(const Job& job) {

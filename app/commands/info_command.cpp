@@ -174,18 +174,24 @@ std::string place_text(const Eigen::Vector3d& p) {
 /// Size of an extended source: ", 3.00 mm wide".
 std::string extent_text(const OpticalSetup& setup) {
   if (setup.extent.none()) return "";
-  const std::string width = setup.point ? fixed(setup.extent.width, 3) + " mm"
-                                        : fixed(1e3 * setup.extent.width, 3) + " mrad";
-  return ", " + width + " wide" + (setup.extent.shape.is_disc() ? "" : ", its picture given");
+  const LampTraits& lamp = traits(setup.lamp);
+  return ", " + fixed(setup.extent.width / lamp.unit, 3) + " " + lamp.width_unit + " wide" +
+         (setup.extent.shape.is_disc() ? "" : ", its picture given");
+}
+
+std::string lamp_text(const ParallelLight& lamp) {
+  return "parallel along " + place_text(lamp.direction);
+}
+
+std::string lamp_text(const PointSource& lamp) {
+  const bool even = lamp.emission == Emission::kIsotropic;
+  return std::string(even ? "point" : "flat") + " source at " + place_text(lamp.position) + " mm";
 }
 
 std::string light_text(const OpticalSetup& setup) {
-  const std::string on =
-      extent_text(setup) + (setup.mode == LightMode::kReflect ? " on a mirror" : "");
-  if (!setup.point) return "parallel along " + place_text(setup.light) + on;
-  const bool even = setup.point->emission == Emission::kIsotropic;
-  return std::string(even ? "point" : "flat") + " source at " + place_text(setup.point->position) +
-         " mm" + on;
+  return std::visit([](const auto& lamp) { return lamp_text(lamp); }, setup.lamp) +
+         extent_text(setup) +
+         (traits(setup.body).transmits ? "" : std::string(" on a ") + traits(setup.body).name);
 }
 
 std::string front_text(const SphericalFront& front) {
@@ -210,10 +216,10 @@ void describe_overhang(Description& d, const Lens& lens) {
 
 void describe_setup(Description& d, const OpticalSetup& setup) {
   d.line("light", light_text(setup));
-  const bool mirror = setup.mode == LightMode::kReflect;
-  d.line(mirror ? "mirror" : "lens",
+  const bool clear = traits(setup.body).transmits;
+  d.line(traits(setup.body).name,
          fixed(setup.lens_size.x(), 2) + " x " + fixed(setup.lens_size.y(), 2) + " mm" +
-             (mirror ? "" : ", refractive index " + fixed(setup.ior, 4)) +
+             (clear ? ", refractive index " + fixed(setup.ior, 4) : "") +
              (setup.spectrum.none() ? ""
                                     : ", Abbe number " + fixed(setup.spectrum.abbe, 1) +
                                           ", colours " + spectrum_text(setup.spectrum) + " nm") +
@@ -237,7 +243,7 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   d.json["ior"] = setup.ior;
   const nlohmann::ordered_json all = setup_json(setup);
   for (const char* key : {"mode", "screen"}) d.json[key] = all.at(key);
-  if (!mirror) d.json["front"] = all.at("front");
+  if (clear) d.json["front"] = all.at("front");
   if (setup.outline) d.json["outline"] = all.at("outline");
   if (!setup.spectrum.none()) d.json["spectrum"] = all.at("spectrum");
   d.json["light"] = all.at("source");  // "source" is what was asked about.

@@ -96,8 +96,9 @@ void require_spectrum(const Scene& scene, const OptionSet& options,
     throw InputError("--abbe: needs --wavelengths; --wavelengths 450,550,650 would do");
   }
   if (setup.spectrum.none()) return;
-  if (setup.mode == LightMode::kReflect) {
-    throw InputError("--wavelengths: a mirror bends light of all colours alike; leave it out");
+  if (!traits(setup.body).transmits) {
+    throw InputError(std::string("--wavelengths: a ") + traits(setup.body).name +
+                     " bends light of all colours alike; leave it out");
   }
   if (fs::path(arguments.out).extension() == ".exr") {
     throw InputError("--out " + arguments.out +

@@ -596,18 +596,12 @@ std::string size_words(const Eigen::Vector2d& size) {
   return decimal_text(size.x(), 0) + " × " + decimal_text(size.y(), 0) + " mm";
 }
 
-std::string light_words(const OpticalSetup& setup) {
-  if (!setup.point) return "parallel light";
-  return "a point source";
-}
-
 std::string header(const LensView& view) {
   const OpticalSetup& setup = view.setup;
-  const bool mirror = setup.mode == LightMode::kReflect;
-  const std::string words = (mirror ? "Mirror of " : "Lens of ") + size_words(setup.lens_size) +
-                            ", " + view.model + " model, in " + light_words(setup) +
-                            "; picture of " + size_words(setup.image_size) +
-                            " at z = " + decimal_text(setup.focal_length, 0) + " mm";
+  const std::string words =
+      capitalised(traits(setup.body).name) + " of " + size_words(setup.lens_size) + ", " +
+      view.model + " model, in " + traits(setup.lamp).name + "; picture of " +
+      size_words(setup.image_size) + " at z = " + decimal_text(setup.focal_length, 0) + " mm";
   return element("h1", "", escape_html(view.name)) + element("p", "", escape_html(words));
 }
 

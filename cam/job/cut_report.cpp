@@ -146,13 +146,13 @@ constexpr double kIndexTolerance = 0.005;
 
 std::string mm(double value, int decimals) { return decimal_text(value, decimals) + " mm"; }
 
-bool is_mirror(const Lens& lens) { return lens.setup.mode == LightMode::kReflect; }
-
-/// Faces that lie down and that are cut. No light passes a mirror: its underside needs no polish.
+/// Faces that lie down and that are cut. If no light passes the part, its underside needs no
+/// polish.
 std::string up_words(PartKind part, const Lens& lens) {
   if (part == PartKind::kMould) return "the mould's cavity is cut from above";
-  if (is_mirror(lens)) {
-    return "underside down, which needs no polish; the mirror's surface is cut from above";
+  if (!traits(lens.setup.body).transmits) {
+    return joined({"underside down, which needs no polish; the ", traits(lens.setup.body).name,
+                   "'s surface is cut from above"});
   }
   if (lens.setup.front) {
     const bool sphere = std::holds_alternative<SphericalFront>(*lens.setup.front);
@@ -221,7 +221,7 @@ SetupSheet setup_sheet(const WrittenCut& cut) {
   sheet.blank = setup.blank;
   const Eigen::Vector2d& corner = cut.corner;
   sheet.zero = {-corner.x(), -corner.y(), -setup.z_offset};
-  const char* const part = is_mirror(designed) ? "mirror" : "lens";
+  const char* const part = traits(designed.setup.body).name;
   sheet.zero_words = joined(
       {"lower left corner of the ", cut.shared ? "blank" : part, ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
@@ -405,8 +405,9 @@ ReportMap fillet_share_map(const CreaseMap& creases) {
 /// and for a mould or a mirror, through whose material no light passes.
 double index_error(const CutSetup& setup) {
   const double stated = setup.options.workshop.material.ior;
-  const bool transmits = setup.options.part == PartKind::kLens && !is_mirror(*setup.lens);
-  if (!(stated > 0.0) || !transmits) return 0.0;
+  const bool lit =
+      setup.options.part == PartKind::kLens && traits(setup.lens->setup.body).transmits;
+  if (!(stated > 0.0) || !lit) return 0.0;
   return std::abs(stated - setup.lens->setup.ior);
 }
 
@@ -549,7 +550,7 @@ Verdict whole_verdict(const WrittenCut& cut, const std::optional<Prediction>& pr
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
-  if (!data.mirror) data.ghost = ghost_share(lens.setup.ior);
+  if (traits(data.body).transmits) data.ghost = ghost_share(lens.setup.ior);
   data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},
                 {surface_name::kRounded, "the most that the ball can reach"},
@@ -584,8 +585,8 @@ ReportData make_report(const WrittenCut& cut, const std::optional<Prediction>& p
   data.job = options.job;
   data.program = program_mark();
   data.lens_id = fingerprint_of(lens);
-  data.mirror = is_mirror(lens);
-  data.part = options.part == PartKind::kMould ? "mould" : (data.mirror ? "mirror" : "lens");
+  data.body = lens.setup.body;
+  data.part = options.part == PartKind::kMould ? "mould" : traits(data.body).name;
   data.lens_size = lens.setup.lens_size;
   data.leakage_options = options.leakage;
   data.operations = report_operations(cut);

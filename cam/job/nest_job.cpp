@@ -138,10 +138,9 @@ void require_alike(const std::vector<NestLens>& lenses) {
   const OpticalSetup& first = lenses.front().lens->setup;
   for (const NestLens& one : lenses) {
     const OpticalSetup& setup = one.lens->setup;
-    if (setup.mode != first.mode) {
-      const bool mirror = setup.mode == LightMode::kReflect;
-      throw InputError(one.name + ": is a " + (mirror ? "mirror" : "lens") + ", " +
-                       lenses.front().name + " is a " + (mirror ? "lens" : "mirror") +
+    if (setup.body != first.body) {
+      throw InputError(one.name + ": is a " + traits(setup.body).name + ", " + lenses.front().name +
+                       " is a " + traits(first.body).name +
                        ": one blank is for one kind; nest them apart");
     }
     if (setup.front) {
@@ -149,7 +148,7 @@ void require_alike(const std::vector<NestLens>& lenses) {
                        ": has a curved front, which its blank has before the first cut; cut it "
                        "alone with cam");
     }
-    if (setup.mode == LightMode::kRefract && !(std::abs(setup.ior - first.ior) <= kSameIndex)) {
+    if (traits(setup.body).transmits && !(std::abs(setup.ior - first.ior) <= kSameIndex)) {
       throw InputError(one.name + ": was designed for index " + trimmed_decimal(setup.ior, 4) +
                        ", " + lenses.front().name + " for " + trimmed_decimal(first.ior, 4) +
                        ": one blank has one material, within 0.005");

@@ -141,8 +141,8 @@ struct ReportData {
   SamplingCheck sampling;           ///< Of the part.
   std::vector<ShownSurface> shown;  ///< Their pictures are shown side by side.
   LeakageOptions leakage_options;
-  bool mirror = false;                  ///< Or a mould of one.
-  double ghost = 0.0;                   ///< ghost_share() of a lens; 0 of a mirror.
+  Body body;                            ///< Of the part, or of the cast from a mould.
+  double ghost = 0.0;                   ///< ghost_share(); 0 if no light passes the part.
   ToleranceForecast tolerances;         ///< Empty unless requested.
   std::vector<LeakPlace> places;        ///< Worst first.
   Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm
@@ -166,7 +166,7 @@ struct ReportData {
   [[nodiscard]] double minutes() const;
   /// The lit part: "lens", or the cast from the mould.
   [[nodiscard]] std::string lit_part() const {
-    const std::string kind = mirror ? "mirror" : "lens";
+    const std::string kind = traits(body).name;
     return part == "mould" ? kind + " that is cast" : kind;
   }
 };

@@ -179,7 +179,7 @@ std::string footer(const ReportData& data) {
       std::string(
           "Lengths in mm, lens frame: origin at the part's lower left corner seen from "
           "above, x right, y away, z up from the ") +
-      (data.mirror ? "underside" : "entry face") + ". Program Z = z " +
+      (traits(data.body).transmits ? "entry face" : "underside") + ". Program Z = z " +
       std::string(data.z_offset < 0.0 ? "− " : "+ ") + decimal_text(std::abs(data.z_offset), 4) +
       " mm.";
   if (data.seconds > 0.0) text += " Made in " + decimal_text(data.seconds, 0) + " s.";

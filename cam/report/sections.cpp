@@ -276,7 +276,7 @@ std::string setup(const ReportData& data) {
       {"Part", box_text(sheet.part)},   {"Program zero", sheet.zero_words},
       {"Which way up", sheet.up_words}, {"Tool length", sheet.length_words}};
   if (sheet.front) list.push_back({"Front", sheet.front_words});
-  if (data.mirror && data.part != "mould") {
+  if (traits(data.body).reflects && data.part != "mould") {
     list.push_back({"To reflect",
                     "coat the polished surface, unless the blank is of a metal that "
                     "reflects, such as aluminium"});
@@ -370,7 +370,7 @@ std::string certificates(const ReportData& data) {
 /// A note on the light in dark parts, by the kind of part: from the ridges of a mirror, or from
 /// reflections at a lens's faces.
 std::string part_words(const ReportData& data) {
-  if (data.mirror) {
+  if (!traits(data.body).transmits) {
     return " Dark parts come from ridges of the mirror, which a ball cuts sharp: only polish "
            "wears them.";
   }

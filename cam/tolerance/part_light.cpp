@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <variant>
 
 #include "core/optics/light_source.h"
 
@@ -27,8 +28,8 @@ void turn_back(OpticalSetup& seen, const Eigen::Matrix3d& turn) {
   const Eigen::Matrix3d back = turn.transpose();
   const Eigen::Vector3d centre = centre_of(seen);
   const Eigen::Vector3d screen = centre + back * (seen.screen_centre() - centre);
-  seen.light = (back * seen.light).normalized();
-  if (seen.point) seen.point->position = centre + back * (seen.point->position - centre);
+  seen.lamp =
+      std::visit([&](const auto& lamp) { return Lamp(lamp.turned(back, centre)); }, seen.lamp);
   seen.screen_x = back * seen.screen_x;
   seen.screen_y = back * seen.screen_y;
   seen.image_origin = screen.head<2>() - 0.5 * seen.image_size;
@@ -51,8 +52,7 @@ OpticalSetup seen_by_part(const OpticalSetup& setup, const PartError& error) {
 
 /// True for parallel light along a lens's axis onto a screen parallel to it.
 bool is_straight(const OpticalSetup& setup) {
-  return setup.mode == LightMode::kRefract && !setup.point && !setup.screen_is_turned() &&
-         setup.light == Eigen::Vector3d::UnitZ();
+  return traits(setup.body).transmits && setup.lamp == Lamp() && !setup.screen_is_turned();
 }
 
 }  // namespace
@@ -108,7 +108,8 @@ Eigen::Vector2d PartLight::source_radii(double angle, double z) const {
   }
   OpticalSetup source = seen_;
   source.extent.shape = {};
-  source.extent.width = angle * (source.point ? (source.point->position - centre_).norm() : 1.0);
+  const auto place = lamp_place(source.lamp);
+  source.extent.width = angle * (place ? (*place - centre_).norm() : 1.0);
   return 0.5 * source.extent.width * source_motion(source, z).rowwise().norm();
 }
 

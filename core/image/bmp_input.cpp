@@ -65,7 +65,7 @@ constexpr std::array<std::uint32_t, 8> kHeaders{kCoreHeader, 16,         40,  52
 constexpr std::size_t kMasks = 54;
 
 /// Maximum size of a profile; printer profiles have 3 MB.
-constexpr std::uint32_t kMostProfileBytes = 1U << 24U;
+constexpr std::uint32_t kMaxProfileBytes = 1U << 24U;
 
 enum Compression : std::uint32_t {
   kRgb = 0,
@@ -203,7 +203,7 @@ std::string profile_of(std::istream& file, const FirstBytes& bytes) {
   if (bytes.number(kFileHeader) < kLongestHeader) return {};
   if (bytes.number(kFileHeader + 56) != kEmbedded) return {};
   const std::uint32_t size = bytes.number(kFileHeader + 116);
-  require(size <= kMostProfileBytes, "its colour profile has " + std::to_string(size) + " bytes");
+  require(size <= kMaxProfileBytes, "its colour profile has " + std::to_string(size) + " bytes");
   return read_at(file, kFileHeader + std::uint64_t{bytes.number(kFileHeader + 112)}, size);
 }
 

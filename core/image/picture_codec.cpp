@@ -145,7 +145,7 @@ DecodedPicture decode_in_child(
     const RunControl& control) {
   require_regular_file(path);
   { const OpenImageIoUse set_up; }
-  constexpr double kMostPixels = double{kMaxImageSide} * kMaxImageSide;
+  constexpr double kMaxPixels = double{kMaxImageSide} * kMaxImageSide;
   RowTaker taker;
   const auto work = [&](const RunControl& inner, const PieceSink& send) {
     RowSender rows(send);
@@ -154,7 +154,7 @@ DecodedPicture decode_in_child(
   const auto take = [&](std::string_view piece) { taker.take(piece); };
   try {
     std::string text =
-        run_in_child("reading picture", decoder_limits(path, kMostPixels), work, take, control);
+        run_in_child("reading picture", decoder_limits(path, kMaxPixels), work, take, control);
     return {std::move(taker).image(), std::move(text)};
   } catch (const ChildFailure& failure) {
     refuse_picture(path, std::string("is no picture that can be read: its decoder ") +
@@ -165,7 +165,7 @@ DecodedPicture decode_in_child(
 namespace {
 
 /// Maximum size of a metadata chunk; printer profiles have 3 MB.
-constexpr std::uint32_t kMostBytes = 1U << 24U;
+constexpr std::uint32_t kMaxBytes = 1U << 24U;
 
 void set_profile(OIIO::ImageSpec& spec, std::string_view profile) {
   if (profile.empty()) return;
@@ -198,7 +198,7 @@ void add_webp_metadata(const fs::path& path, OIIO::ImageSpec& spec) {
     const std::uint32_t size = little_endian(std::string_view(head).substr(4));
     const std::streamoff begin = file.tellg();
     const std::streamoff next = begin + size + size % 2;
-    if ((head.starts_with("EXIF") || head.starts_with("ICCP")) && size <= kMostBytes) {
+    if ((head.starts_with("EXIF") || head.starts_with("ICCP")) && size <= kMaxBytes) {
       std::string data(size, '\0');
       if (!file.read(data.data(), std::streamsize{size})) return;
       if (head.starts_with("EXIF")) set_orientation(spec, data);
@@ -222,9 +222,9 @@ void add_heif_metadata(const fs::path& path, OIIO::ImageSpec& spec) {
   const std::unique_ptr<heif_image_handle, decltype(&heif_image_handle_release)> picture(
       first, heif_image_handle_release);
   std::string profile(
-      std::min<std::size_t>(heif_image_handle_get_raw_color_profile_size(first), kMostBytes + 1),
+      std::min<std::size_t>(heif_image_handle_get_raw_color_profile_size(first), kMaxBytes + 1),
       '\0');
-  if (profile.empty() || profile.size() > kMostBytes) return;
+  if (profile.empty() || profile.size() > kMaxBytes) return;
   const heif_error error = heif_image_handle_get_raw_color_profile(first, profile.data());
   if (error.code == heif_error_Ok) set_profile(spec, profile);
 }

@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Maximum layers, more than any of our files has.
-constexpr int kMostLayers = 64;
+constexpr int kMaxLayers = 64;
 
 /// Names in the order of EXR channels.
 std::vector<std::string> sorted(std::vector<std::string> names) {
@@ -54,9 +54,9 @@ std::string send_layers(const fs::path& path, RowSender& sender) {
   const auto input = OIIO::ImageInput::open(path.string());
   if (!input) refuse(path, "cannot be read as an EXR file");
   const OIIO::ImageSpec& spec = input->spec();
-  if (std::max(spec.width, spec.height) > kMaxImageSide || spec.nchannels > kMostLayers) {
+  if (std::max(spec.width, spec.height) > kMaxImageSide || spec.nchannels > kMaxLayers) {
     refuse(path, "is larger than " + std::to_string(kMaxImageSide) + " a side with " +
-                     std::to_string(kMostLayers) + " layers");
+                     std::to_string(kMaxLayers) + " layers");
   }
   sender.begin(spec.width, spec.height * spec.nchannels, 0.0F);
   std::vector<float> layer(spec.image_pixels());

@@ -190,7 +190,7 @@ class SvgFonts {
  public:
   /// @param families  as font-family lists them.
   void add(const std::string& families) {
-    if (families_.size() < kMostLists) families_.insert(families);
+    if (families_.size() < kMaxLists) families_.insert(families);
   }
 
   /// The first character that no installed font has, as a problem; empty if there is none.
@@ -201,7 +201,7 @@ class SvgFonts {
 
  private:
   /// A look-up takes a millisecond, and a file may have a million lists.
-  static constexpr std::size_t kMostLists = 100;
+  static constexpr std::size_t kMaxLists = 100;
 
   struct DestroyCharacters {
     void operator()(FcCharSet* characters) const { FcCharSetDestroy(characters); }
@@ -315,10 +315,10 @@ std::vector<std::string> SvgFonts::remarks() const {
 }
 
 /// Maximum names from the file in findings: it may have a thousand.
-constexpr std::size_t kMostNames = 30;
+constexpr std::size_t kMaxNames = 30;
 
 /// Maximum nesting of drawings that is examined.
-constexpr int kMostNested = 4;
+constexpr int kMaxNested = 4;
 
 using Reader = std::unique_ptr<xmlTextReader, Free<xmlFreeTextReader>>;
 
@@ -628,7 +628,7 @@ class Survey {
       if (!link || lower_case(link->substr(0, 5)) != "data:") continue;
       const std::string finding = undrawn_of_picture(*link);
       if (!finding.empty() && is_new(finding)) add(needs_.left_out, finding);
-      const std::string inner = depth_ < kMostNested ? drawing_at(*link) : "";
+      const std::string inner = depth_ < kMaxNested ? drawing_at(*link) : "";
       if (!inner.empty()) take_over(Survey(depth_ + 1).of(inner));
     }
   }
@@ -665,9 +665,9 @@ class Survey {
     if (needs_.problem.empty()) needs_.problem = fonts_.problem_of(text);
   }
 
-  /// True for the first occurrence of a name, until there are kMostNames.
+  /// True for the first occurrence of a name, until there are kMaxNames.
   bool is_new(const std::string& name) {
-    return names_.size() < kMostNames && names_.insert(name).second;
+    return names_.size() < kMaxNames && names_.insert(name).second;
   }
 
   void leave_out(const UndrawnThing& thing) {

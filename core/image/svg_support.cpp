@@ -276,7 +276,7 @@ constexpr std::size_t kLongestValue = 60;
 constexpr std::size_t kLongestLine = std::size_t{64} << 10U;
 
 /// Maximum kinds of findings: a file may cause a thousand.
-constexpr std::size_t kMostKinds = 24;
+constexpr std::size_t kMaxKinds = 24;
 
 struct Advice {
   std::string_view mark;
@@ -411,7 +411,7 @@ bool is_list_of_places(std::string_view name, std::string_view value) {
 }  // namespace
 
 void SvgLogReader::add(const std::string& kind, const std::string& finding) {
-  if (findings_.size() < kMostKinds) findings_.emplace(kind, finding);
+  if (findings_.size() < kMaxKinds) findings_.emplace(kind, finding);
 }
 
 void SvgLogReader::take_value(std::string_view name, std::string_view value) {

@@ -150,19 +150,6 @@ json read_json(const fs::path& path) {
   return parse_json(read_whole_file(path, kMaxJsonBytes), path.string());
 }
 
-/// The value that belongs to a word.
-template <class Value>
-Value choice(const JsonFields& fields, const std::string& name,
-             const std::vector<std::pair<std::string, Value>>& words) {
-  const std::string text = fields.text(name);
-  std::string rule = "it must be";
-  for (const auto& [word, value] : words) {
-    if (text == word) return value;
-    rule += (word == words.front().first ? " \"" : " or \"") + word + "\"";
-  }
-  fields.refuse(name, rule);
-}
-
 void check_supported(const JsonFields& fields) {
   if (fields.text("format") != kFormat) {
     fields.refuse("format", std::string("only \"") + kFormat + "\" can be read");
@@ -345,7 +332,7 @@ Lens read_lens(const fs::path& folder) {
   check_supported(fields);
   Lens lens;
   lens.setup = read_setup(fields, folder, path.string());
-  lens.model = choice<SurfaceModel>(fields, "model", named_models());
+  lens.model = word_in(fields, "model", named_models());
   if (lens.model == SurfaceModel::kSpline)
     lens.spline = read_own_spline(fields, lens.setup, folder);
   const JsonFields metrics = fields.object("metrics");

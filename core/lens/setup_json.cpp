@@ -2,7 +2,7 @@
 #include "core/lens/setup_json.h"
 
 #include <Eigen/Core>
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -17,6 +17,7 @@
 #include "core/optics/outline.h"
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -88,11 +89,6 @@ Outline read_outline(const JsonFields& outline, const Eigen::Vector2d& lens_size
   outline.refuse("type", R"(it must be "circle", "rounded_rectangle" or "polygon")");
 }
 
-/// Keys of a source's extent.
-constexpr const char* kAngle = "angle_mrad";
-constexpr const char* kSize = "size_mm";
-constexpr double kMilliradian = 1e-3;
-
 template <class Vector>
 ordered_json array_of(const Vector& vector) {
   ordered_json array = ordered_json::array();
@@ -114,19 +110,32 @@ ordered_json shape_json(const SourceShape& shape) {
   return rows;
 }
 
-ordered_json bare_source_json(const OpticalSetup& setup) {
-  if (!setup.point) return {{"type", "parallel"}, {"direction", array_of(setup.light)}};
-  const bool even = setup.point->emission == Emission::kIsotropic;
-  return {{"type", "point"},
-          {"position", array_of(setup.point->position)},
-          {"emission", even ? "isotropic" : "lambertian"}};
+/// An object of one of several kinds: its type and its fields.
+template <class Kind>
+ordered_json typed_json(const char* type, const Kind& object) {
+  ordered_json document = {{"type", type}};
+  document.update(json_of(description_of(object)));
+  return document;
+}
+
+/// typed_json() read back.
+template <class... Kinds>
+void read_typed(const JsonFields& fields, std::variant<Kinds...>& object) {
+  const std::string type = fields.text("type");
+  const auto read = [&](auto& held) { read_json(description_of(held), fields); };
+  const bool known =
+      ((type == Kinds::kTraits.type && (read(object.template emplace<Kinds>()), true)) || ...);
+  const std::array<std::string, sizeof...(Kinds)> types{Kinds::kTraits.type...};
+  if (!known) fields.refuse("type", joined({"it must be \"", joined(types, "\" or \""), "\""}));
 }
 
 ordered_json source_json(const OpticalSetup& setup) {
-  ordered_json source = bare_source_json(setup);
+  ordered_json source =
+      std::visit([](const auto& lamp) { return typed_json(lamp.kTraits.type, lamp); }, setup.lamp);
   const SourceExtent& extent = setup.extent;
   if (extent.none()) return source;
-  source[setup.point ? kSize : kAngle] = setup.point ? extent.width : extent.width / kMilliradian;
+  const LampTraits& lamp = traits(setup.lamp);
+  source[lamp.width_key] = extent.width / lamp.unit;
   if (!extent.shape.is_disc()) source["shape"] = shape_json(extent.shape);
   return source;
 }
@@ -154,11 +163,10 @@ SourceShape read_shape(const JsonFields& source) {
   return shape;
 }
 
-void read_extent(const JsonFields& source, OpticalSetup& setup) {
-  const char* const key = setup.point ? kSize : kAngle;
-  if (source.has(key)) {
-    setup.extent.width = source.number(key) * (setup.point ? 1.0 : kMilliradian);
-  }
+void read_source(const JsonFields& source, OpticalSetup& setup) {
+  read_typed(source, setup.lamp);
+  const LampTraits& lamp = traits(setup.lamp);
+  if (source.has(lamp.width_key)) setup.extent.width = source.number(lamp.width_key) * lamp.unit;
   if (source.has("shape")) setup.extent.shape = read_shape(source);
 }
 
@@ -171,30 +179,12 @@ ordered_json screen_json(const OpticalSetup& setup) {
           {"size", array_of(setup.image_size)}};
 }
 
-void read_source(const JsonFields& source, OpticalSetup& setup) {
-  const std::string type = source.text("type");
-  if (type == "parallel") {
-    const Eigen::Vector3d usual(0.0, 0.0, 1.0);
-    setup.light = source.has("direction") ? source.number_triple("direction") : usual;
-  } else if (type == "point") {
-    PointSource point{source.number_triple("position"), Emission::kIsotropic};
-    const std::string emission = source.has("emission") ? source.text("emission") : "isotropic";
-    if (emission == "lambertian") {
-      point.emission = Emission::kLambertian;
-    } else if (emission != "isotropic") {
-      source.refuse("emission", R"(it must be "isotropic" or "lambertian")");
-    }
-    setup.point = point;
-  } else {
-    source.refuse("type", R"(it must be "parallel" or "point")");
-  }
-  read_extent(source, setup);
-}
-
 void read_front(const JsonFields& front, const std::filesystem::path& folder, OpticalSetup& setup) {
   const std::string type = front.text("type");
   if (type == "sphere") {
-    setup.front = SphericalFront{front.number("radius"), front.number_triple("apex")};
+    SphericalFront sphere;
+    read_json(description_of(sphere), front);
+    setup.front = sphere;
   } else if (type == "heights") {
     HeightGrid grid = read_heights(named_file(front, "file", folder));
     setup.front =
@@ -211,40 +201,7 @@ ordered_json front_json(const OpticalSetup& setup) {
   if (const auto* const map = std::get_if<HeightFront>(&*setup.front)) {
     return {{"type", "heights"}, {"file", lens_file::kFront}, {"size", array_of(map->size)}};
   }
-  const auto& sphere = std::get<SphericalFront>(*setup.front);
-  return {{"type", "sphere"}, {"radius", sphere.radius}, {"apex", array_of(sphere.apex)}};
-}
-
-ordered_json spectrum_json(const Spectrum& spectrum) {
-  ordered_json document = {{"wavelengths_nm", spectrum.wavelengths}};
-  if (!spectrum.powers.empty()) document["powers"] = spectrum.powers;
-  document["abbe"] = spectrum.abbe;
-  return document;
-}
-
-std::vector<double> read_numbers(const JsonFields& fields, const std::string& name) {
-  std::vector<double> numbers;
-  const nlohmann::json& list = fields.at(name);
-  const auto is_number = [](const nlohmann::json& entry) { return entry.is_number(); };
-  if (!list.is_array() || !std::all_of(list.begin(), list.end(), is_number)) {
-    fields.refuse(name, "it must be a list of numbers");
-  }
-  for (const nlohmann::json& entry : list) numbers.push_back(entry.get<double>());
-  return numbers;
-}
-
-Spectrum read_spectrum(const JsonFields& fields) {
-  Spectrum spectrum;
-  spectrum.wavelengths = read_numbers(fields, "wavelengths_nm");
-  if (fields.has("powers")) spectrum.powers = read_numbers(fields, "powers");
-  spectrum.abbe = fields.number("abbe");
-  return spectrum;
-}
-
-bool read_fresnel(const JsonFields& fields) {
-  const nlohmann::json& value = fields.at("fresnel");
-  if (!value.is_boolean()) fields.refuse("fresnel", "it must be true or false");
-  return value.get<bool>();
+  return typed_json("sphere", std::get<SphericalFront>(*setup.front));
 }
 
 void read_screen(const JsonFields& screen, OpticalSetup& setup) {
@@ -270,16 +227,16 @@ void require_agreement(const JsonFields& fields, const OpticalSetup& setup) {
 }
 
 ordered_json setup_json(const OpticalSetup& setup) {
-  const bool lens = setup.mode == LightMode::kRefract;
-  ordered_json document = {{"mode", lens ? "refract" : "reflect"}};
-  if (!lens && !setup.point) {
+  ordered_json document = {{"mode", traits(setup.body).mode}};
+  const auto* const parallel = std::get_if<ParallelLight>(&setup.lamp);
+  if (traits(setup.body).lit_from_above && parallel != nullptr) {
     constexpr double kDegrees = 180.0 / 3.14159265358979323846;
-    document["incidence_deg"] = kDegrees * std::acos(-setup.light.z());
+    document["incidence_deg"] = kDegrees * std::acos(-parallel->direction.z());
   }
   document["source"] = source_json(setup);
-  if (lens) document["front"] = front_json(setup);
+  if (traits(setup.body).transmits) document["front"] = front_json(setup);
   document["ior"] = setup.ior;
-  if (!setup.spectrum.none()) document["spectrum"] = spectrum_json(setup.spectrum);
+  if (!setup.spectrum.none()) document["spectrum"] = json_of(description_of(setup.spectrum));
   if (setup.fresnel) document["fresnel"] = true;
   if (!setup.screen_is_turned()) document["focal_length"] = setup.focal_length;
   document["lens_size"] = array_of(setup.lens_size);
@@ -303,17 +260,14 @@ std::filesystem::path named_file(const JsonFields& fields, const std::string& fi
 
 OpticalSetup read_setup(const JsonFields& fields, const std::filesystem::path& folder) {
   OpticalSetup setup;
-  const std::string mode = fields.text("mode");
-  if (mode == "reflect") {
-    setup.mode = LightMode::kReflect;
-  } else if (mode != "refract") {
-    fields.refuse("mode", R"(it must be "refract" or "reflect")");
-  }
+  setup.body = word_in(fields, "mode", named_bodies());
   read_source(fields.object("source"), setup);
   if (fields.has("front")) read_front(fields.object("front"), folder, setup);
   setup.ior = fields.number("ior");
-  if (fields.has("spectrum")) setup.spectrum = read_spectrum(fields.object("spectrum"));
-  if (fields.has("fresnel")) setup.fresnel = read_fresnel(fields);
+  if (fields.has("spectrum")) {
+    read_json(description_of(setup.spectrum), fields.object("spectrum"));
+  }
+  if (fields.has("fresnel")) setup.fresnel = fields.flag("fresnel");
   setup.lens_size = fields.number_pair("lens_size");
   if (fields.has("outline")) {
     setup.outline = read_outline(fields.object("outline"), setup.lens_size);
@@ -321,9 +275,8 @@ OpticalSetup read_setup(const JsonFields& fields, const std::filesystem::path& f
   setup.image_size = fields.number_pair("image_size");
   setup.image_origin = fields.number_pair("image_origin");
   setup.pixels = fields.integer_pair("pixels");
-  const std::string view = fields.text("view");
-  if (view != "front" && view != "rear") fields.refuse("view", R"(it must be "front" or "rear")");
-  setup.view = view == "front" ? ViewSide::kFront : ViewSide::kRear;
+  setup.view =
+      word_in<ViewSide>(fields, "view", {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}});
   if (fields.has("screen")) read_screen(fields.object("screen"), setup);
   if (!setup.screen_is_turned()) setup.focal_length = fields.number("focal_length");
   return setup;

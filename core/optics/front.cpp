@@ -11,6 +11,7 @@
 #include "core/compute/scalar.h"
 #include "core/optics/light_path.h"
 #include "core/optics/light_source.h"
+#include "core/schema/description.h"
 
 namespace lensforge {
 namespace {
@@ -116,6 +117,11 @@ double lowest(const HeightFront& front, const Eigen::AlignedBox2d& rectangle) {
 
 }  // namespace
 
+void describe(Description& d, SphericalFront& front) {
+  d.number("radius", front.radius, {}, "mm", "above 0 convex").needed = true;
+  d.numbers("apex", front.apex, "mm").needed = true;
+}
+
 SphericalFront spherical_front(double radius, const Eigen::Vector2d& lens_size) {
   const Eigen::Vector2d middle = 0.5 * lens_size;
   SphericalFront front{radius, {middle.x(), middle.y(), 0.0}};
@@ -130,9 +136,7 @@ bool is_shadowed(const OpticalSetup& setup, const Eigen::Vector2d& place) {
   const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), setup.lens_size);
   const Eigen::Vector3d e(place.x(), place.y(), front.height(place));
   // Twice the diagonal back, parallel light is outside the part's plan or depth.
-  const Eigen::Vector3d from =
-      setup.point ? setup.point->position
-                  : Eigen::Vector3d(e - 2.0 * setup.lens_size.norm() * setup.light);
+  const Eigen::Vector3d from = lamp_before(setup.lamp, e, 2.0 * setup.lens_size.norm());
   for (int k = 0; k < kSamples; ++k) {
     const Eigen::Vector3d p = from + (k / double{kSamples}) * (e - from);
     if (plan.contains(p.head<2>()) && p.z() > front.height(p.head<2>())) return true;
@@ -172,8 +176,7 @@ double lowest_of(const Front& front, const Eigen::AlignedBox2d& rectangle) {
 std::optional<FrontFault> height_map_fault(const OpticalSetup& setup, double z) {
   const auto& map = std::get<HeightFront>(setup.front.value());
   const FrontSurface front(map);
-  const FrontLight light{setup.point ? setup.point->position : setup.light, setup.point.has_value(),
-                         setup.ior};
+  const FrontLight light = LightSource(setup).before_front();
   const HeightGrid& grid = map.spline->grid();
   const Eigen::Vector2d half = 0.5 * step_of(map);
   for (int j = 0; j < 2 * grid.rows - 1; ++j) {

@@ -17,6 +17,7 @@
 
 namespace lensforge {
 
+class Description;
 struct OpticalSetup;
 
 // Height maps. Notation: t position along an axis in samples, 0 … n − 1 from the least coordinate;
@@ -110,6 +111,8 @@ struct HeightFront {
 
 /// A lens's entry face that is not flat.
 using Front = std::variant<SphericalFront, HeightFront>;
+
+void describe(Description& d, SphericalFront& front);
 
 /// Height of the front at a point, with derivatives.
 struct FrontPoint {

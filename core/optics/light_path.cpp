@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <variant>
 
 #include "core/optics/front.h"
 #include "core/optics/refraction.h"
@@ -50,7 +51,7 @@ LightPath::LightPath(const OpticalSetup& setup)
       per_whole_(1.0 /
                  (source_.varies() ? front_intake(source_, setup.lens_size) : aperture(setup))),
       eta_(setup.ior),
-      kind_(setup.mode == LightMode::kReflect ? kMirror : (setup.fresnel ? kLosing : kLens)),
+      kind_(std::visit([&](const auto& body) { return kind_of(body, setup.fresnel); }, setup.body)),
       middle_(0.5 * setup.lens_size) {}
 
 Eigen::Vector2d LightPath::gradient_for(const Eigen::Vector3d& p,

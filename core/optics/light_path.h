@@ -296,6 +296,9 @@ class LightPath {
   static constexpr std::int64_t kLosing = 1;
   static constexpr std::int64_t kMirror = 2;
 
+  // One for each kind of part.
+  static std::int64_t kind_of(const LensBody&, bool fresnel) { return fresnel ? kLosing : kLens; }
+  static std::int64_t kind_of(const MirrorBody&, bool /*fresnel*/) { return kMirror; }
   [[nodiscard]] LF_HD bool reflects() const { return kind_ == kMirror; }
   [[nodiscard]] LF_HD bool loses() const { return kind_ == kLosing; }
   [[nodiscard]] LF_HD ValueSlope barrier_along_z(const Eigen::Vector3d& n) const {

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <numbers>
 #include <numeric>
+#include <variant>
 
 #include "core/optics/light_path.h"
 #include "core/optics/refraction.h"
@@ -15,32 +16,40 @@
 namespace lensforge {
 
 LightSource::LightSource(const OpticalSetup& setup)
-    : direction_(setup.light),
+    : direction_(Eigen::Vector3d::UnitZ()),
       position_(Eigen::Vector3d::Zero()),
       axis_(Eigen::Vector3d::UnitZ()),
       eta_(setup.ior),
       scale_(1.0),
       lambertian_(0.0),
       kind_(Kind::kAlongZ) {
-  const bool lens = setup.mode == LightMode::kRefract;
   if (setup.front) front_ = FrontSurface(*setup.front);
-  if (setup.point) {
-    kind_ = setup.front ? Kind::kPointBent : lens ? Kind::kPointBehindFront : Kind::kPoint;
-    position_ = setup.point->position;
-    const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
-    const Eigen::Vector3d way = middle - position_;
-    axis_ = way.normalized();
-    // An evenly lit lens takes in its plan area; a solid angle is plan area × |way_z| / |way|³.
-    scale_ = way.squaredNorm() * way.norm() / way.z();
-    lambertian_ = setup.point->emission == Emission::kLambertian ? 1.0 : 0.0;
-  } else if (setup.front) {
+  std::visit([&](const auto& lamp) { set(lamp, setup); }, setup.lamp);
+}
+
+void LightSource::set(const ParallelLight& lamp, const OpticalSetup& setup) {
+  direction_ = lamp.direction;
+  if (setup.front) {
     kind_ = Kind::kParallelBent;
-  } else if (!lens) {
+  } else if (!traits(setup.body).transmits) {
     kind_ = Kind::kParallel;
-  } else if (setup.light != Eigen::Vector3d::UnitZ()) {
+  } else if (direction_ != Eigen::Vector3d::UnitZ()) {
     kind_ = Kind::kParallel;
-    direction_ = refract(setup.light, Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
+    direction_ = refract(lamp.direction, Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
   }
+}
+
+void LightSource::set(const PointSource& lamp, const OpticalSetup& setup) {
+  kind_ = setup.front                    ? Kind::kPointBent
+          : traits(setup.body).transmits ? Kind::kPointBehindFront
+                                         : Kind::kPoint;
+  position_ = lamp.position;
+  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
+  const Eigen::Vector3d way = middle - position_;
+  axis_ = way.normalized();
+  // An evenly lit lens takes in its plan area; a solid angle is plan area × |way_z| / |way|³.
+  scale_ = way.squaredNorm() * way.norm() / way.z();
+  lambertian_ = lamp.emission == Emission::kLambertian ? 1.0 : 0.0;
 }
 
 Eigen::Vector3d LightSource::mean_direction(const Eigen::Vector2d& size) const {
@@ -122,6 +131,22 @@ SourceFrame frame_across(const Eigen::Vector3d& direction) {
   return {up.cross(direction), up};
 }
 
+/// @param middle  of the lens.
+PointSource moved(const PointSource& lamp, const Eigen::Vector2d& at,
+                  const Eigen::Vector2d& middle) {
+  const Eigen::Vector3d to(middle.x(), middle.y(), 0.0);
+  const SourceFrame frame = frame_across((to - lamp.position).normalized());
+  return {lamp.position + (at.x() * frame.right + at.y() * frame.up), lamp.emission};
+}
+
+ParallelLight moved(const ParallelLight& lamp, const Eigen::Vector2d& at,
+                    const Eigen::Vector2d& /*middle*/) {
+  if (at.isZero()) return lamp;
+  // The light travels opposite to the direction of the source.
+  const SourceFrame frame = frame_across(lamp.direction);
+  return {(lamp.direction - at.x() * frame.right - at.y() * frame.up).normalized()};
+}
+
 }  // namespace
 
 std::vector<SourcePoint> source_points(const SourceExtent& extent, int count) {
@@ -132,16 +157,8 @@ std::vector<SourcePoint> source_points(const SourceExtent& extent, int count) {
 
 OpticalSetup lit_from(OpticalSetup setup, const Eigen::Vector2d& at) {
   setup.extent = {};
-  if (setup.point) {
-    const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
-    const SourceFrame frame = frame_across((middle - setup.point->position).normalized());
-    setup.point->position += at.x() * frame.right + at.y() * frame.up;
-    return setup;
-  }
-  if (at.isZero()) return setup;
-  // The light travels opposite to the direction of the source.
-  const SourceFrame frame = frame_across(setup.light);
-  setup.light = (setup.light - at.x() * frame.right - at.y() * frame.up).normalized();
+  setup.lamp = std::visit(
+      [&](const auto& lamp) { return Lamp(moved(lamp, at, 0.5 * setup.lens_size)); }, setup.lamp);
   return setup;
 }
 

@@ -351,8 +351,12 @@ class LightSource {
       return FrontRay(across, -position_.z(), p.z(), eta_).ray(position_);
     }
     if (kind_ == Kind::kPoint) return ray_in_air(p);
+    return ray_through_front(front_, before_front(), p);
+  }
+  /// The light before a curved front. @pre is_bent().
+  [[nodiscard]] LF_HD FrontLight before_front() const {
     const bool point = kind_ == Kind::kPointBent;
-    return ray_through_front(front_, {point ? position_ : direction_, point, eta_}, p);
+    return {point ? position_ : direction_, point, eta_};
   }
 
   /// a at p.
@@ -442,6 +446,10 @@ class LightSource {
     kParallelBent,      ///< Parallel, through a curved front.
     kPointBent,         ///< From a point, through a curved front.
   };
+
+  // One for each kind of lamp.
+  void set(const ParallelLight& lamp, const OpticalSetup& setup);
+  void set(const PointSource& lamp, const OpticalSetup& setup);
 
   [[nodiscard]] LF_HD bool lambertian() const { return lambertian_ != 0.0; }
   /// Area of a triangle across parallel light, scaled to an evenly lit lens.

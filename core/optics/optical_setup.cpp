@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <numbers>
 #include <sstream>
 #include <string>
 #include <variant>
@@ -13,8 +14,10 @@
 
 #include "core/error.h"
 #include "core/image/color.h"
+#include "core/schema/description.h"
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -69,6 +72,12 @@ std::string spectrum_text(const Spectrum& spectrum) {
   return text;
 }
 
+void describe(Description& d, Spectrum& spectrum) {
+  d.numbers("wavelengths_nm", spectrum.wavelengths, "ascending").needed = true;
+  d.numbers("powers", spectrum.powers, "the source's at each").zero_if_missing = true;
+  d.number("abbe", spectrum.abbe, {}, "", "Abbe number of the material").needed = true;
+}
+
 bool is_valid(const Spectrum& spectrum) {
   const std::vector<double>& nm = spectrum.wavelengths;
   const std::vector<double>& powers = spectrum.powers;
@@ -104,17 +113,22 @@ void require_positive(const std::string& field, double value) {
 
 bool is_unit(const Eigen::Vector3d& v) { return std::abs(v.norm() - 1.0) < kUnitTolerance; }
 
-void require_light(const OpticalSetup& setup) {
-  const bool lens = setup.mode == LightMode::kRefract;
-  if (!setup.point) {
-    require(is_unit(setup.light) && (lens ? setup.light.z() > 0.0 : setup.light.z() < 0.0), "light",
-            setup.light.transpose(),
-            lens ? "a unit vector towards +z" : "a unit vector towards -z");
-    return;
-  }
-  const Eigen::Vector3d& from = setup.point->position;
-  require(from.allFinite() && (lens ? from.z() < 0.0 : from.z() > 0.0), "source.position",
-          from.transpose(), lens ? "finite, its z below 0" : "finite, its z above 0");
+void require_lamp(const ParallelLight& lamp, bool above) {
+  require(is_unit(lamp.direction) && lamp.comes_from(above, 0.0), "light",
+          lamp.direction.transpose(),
+          above ? "a unit vector towards -z" : "a unit vector towards +z");
+}
+
+void require_lamp(const PointSource& lamp, bool above) {
+  require(lamp.position.allFinite() && lamp.comes_from(above, 0.0), "source.position",
+          lamp.position.transpose(), above ? "finite, its z above 0" : "finite, its z below 0");
+}
+
+/// @throw InputError if a part has a field that only parts have which transmit light.
+template <class Value>
+void require_absent(const OpticalSetup& setup, const std::string& field, const Value& value) {
+  require(traits(setup.body).transmits, field, value,
+          std::string("left out of a ") + traits(setup.body).name);
 }
 
 void require_front(const HeightFront& front, const OpticalSetup& setup) {
@@ -138,8 +152,7 @@ void require_front(const SphericalFront& front, const OpticalSetup& setup) {
 void require_front(const OpticalSetup& setup) {
   if (!setup.front) return;
   const bool sphere = std::holds_alternative<SphericalFront>(*setup.front);
-  require(setup.mode == LightMode::kRefract, "front", sphere ? "sphere" : "heights",
-          "left out of a mirror");
+  require_absent(setup, "front", sphere ? "sphere" : "heights");
   std::visit([&setup](const auto& front) { require_front(front, setup); }, *setup.front);
 }
 
@@ -179,8 +192,7 @@ void require_spectrum(const OpticalSetup& setup) {
       is_valid(setup.spectrum), "spectrum", text,
       "2 to 5 rising wavelengths from 380 to 780 nm, with powers above 0 at all or none, and an "
       "Abbe number from 10 to 200");
-  require(setup.spectrum.none() || setup.mode == LightMode::kRefract, "spectrum", text,
-          "left out of a mirror");
+  if (!setup.spectrum.none()) require_absent(setup, "spectrum", text);
 }
 
 void require_screen(const OpticalSetup& setup) {
@@ -195,7 +207,8 @@ void require_screen(const OpticalSetup& setup) {
 }  // namespace
 
 void validate(const OpticalSetup& setup) {
-  require_light(setup);
+  std::visit([&](const auto& lamp) { require_lamp(lamp, traits(setup.body).lit_from_above); },
+             setup.lamp);
   require_extent(setup.extent);
   require_screen(setup);
   require(std::isfinite(setup.ior) && setup.ior > 1.0, "ior", setup.ior, "a finite number above 1");
@@ -208,11 +221,94 @@ void validate(const OpticalSetup& setup) {
             setup.image_origin[axis], "a finite number of mm");
     require(setup.pixels[axis] > 0, "pixels" + index, setup.pixels[axis], "1 or more");
   }
-  require(!setup.fresnel || setup.mode == LightMode::kRefract, "fresnel", "true",
-          "left out of a mirror");
+  if (setup.fresnel) require_absent(setup, "fresnel", "true");
   require_front(setup);
   require_outline(setup);
   require_spectrum(setup);
+}
+
+std::vector<std::pair<std::string, Emission>> named_emissions() {
+  return {{"isotropic", Emission::kIsotropic}, {"lambertian", Emission::kLambertian}};
+}
+
+void describe(Description& d, ParallelLight& lamp) {
+  d.numbers("direction", lamp.direction, "unit vector before the surface");
+}
+
+void describe(Description& d, PointSource& lamp) {
+  d.numbers("position", lamp.position, "mm").needed = true;
+  d.word("emission", lamp.emission, named_emissions(), "intensity by direction");
+}
+
+const LampTraits& traits(const Lamp& lamp) {
+  return std::visit([](const auto& one) -> const LampTraits& { return one.kTraits; }, lamp);
+}
+
+std::optional<Eigen::Vector3d> lamp_place(const Lamp& lamp) {
+  return std::visit([](const auto& one) { return one.place(); }, lamp);
+}
+
+Eigen::Vector3d lamp_before(const Lamp& lamp, const Eigen::Vector3d& p, double away) {
+  return std::visit([&](const auto& one) { return one.before(p, away); }, lamp);
+}
+
+const BodyTraits& traits(const Body& body) {
+  return std::visit([](const auto& one) -> const BodyTraits& { return one.kTraits; }, body);
+}
+
+std::vector<std::pair<std::string, Body>> named_bodies() {
+  const auto named = []<class... Bodies>(const std::variant<Bodies...>&) {
+    return std::vector<std::pair<std::string, Body>>{{Bodies::kTraits.mode, Bodies()}...};
+  };
+  return named(Body());
+}
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+std::string page_number(double value) { return trimmed_decimal(value, 1); }
+
+std::string words_of(const ParallelLight& lamp, const OpticalSetup& setup) {
+  if (!traits(setup.body).lit_from_above) {
+    return std::string("parallel, straight onto the ") + (setup.front ? "front" : "flat face");
+  }
+  const double angle = std::acos(std::clamp(-lamp.direction.z(), -1.0, 1.0)) / kDegree;
+  return joined(
+      {"parallel, ", page_number(angle), "° from the ", traits(setup.body).name, "'s z axis"});
+}
+
+std::string words_of(const PointSource& lamp, const OpticalSetup& /*setup*/) {
+  const bool even = lamp.emission == Emission::kIsotropic;
+  return joined({even ? "point source" : "flat LED, towards the middle of the part,", " at ",
+                 place_words(lamp.position)});
+}
+
+std::string width_words(const ParallelLight& lamp, double width) {
+  return trimmed_decimal(width / lamp.kTraits.unit, 2) + " mrad (" +
+         trimmed_decimal(width / kDegree, 2) + "°)";
+}
+
+std::string width_words(const PointSource& /*lamp*/, double width) {
+  return trimmed_decimal(width, 2) + " mm";
+}
+
+}  // namespace
+
+std::string lamp_words(const OpticalSetup& setup) {
+  const auto words = [&](const auto& lamp) {
+    const std::string text = words_of(lamp, setup);
+    if (setup.extent.none()) return text;
+    const bool disc = setup.extent.shape.is_disc();
+    return joined({text, disc ? ", a disc " : ", a shape of its own ",
+                   width_words(lamp, setup.extent.width), " wide"});
+  };
+  return std::visit(words, setup.lamp);
+}
+
+std::string place_words(const Eigen::Vector3d& p) {
+  return joined(
+      {"x ", page_number(p.x()), ", y ", page_number(p.y()), ", z ", page_number(p.z()), " mm"});
 }
 
 OpticalSetup in_color(OpticalSetup setup, double wavelength) {

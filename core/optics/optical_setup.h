@@ -4,12 +4,16 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/optics/front.h"
 #include "core/optics/outline.h"
 
 namespace lensforge {
+
+class Description;
 
 /// Range of Abbe numbers of optical materials, from dense flint to fluorite, with a margin.
 inline constexpr double kMinAbbe = 10.0;
@@ -51,6 +55,8 @@ Spectrum parse_spectrum(const std::string& text, const std::string& name);
 /// The text from which parse_spectrum() reads the same wavelengths and powers; "" for none.
 std::string spectrum_text(const Spectrum& spectrum);
 
+void describe(Description& d, Spectrum& spectrum);
+
 /// True if parse_spectrum() would accept it and the Abbe number is one of a material.
 bool is_valid(const Spectrum& spectrum);
 
@@ -84,21 +90,105 @@ struct SourceExtent {
 /// The viewer's side: the lens's side of an opaque wall, or behind a translucent screen.
 enum class ViewSide { kFront, kRear };
 
-/// The surface is either the exit face of a lens, with the entry face below it, or a mirror lit
-/// from above.
-enum class LightMode { kRefract, kReflect };
-
 /// Intensity of a point source by direction: constant, or proportional to the cosine of the angle
 /// to the line from the source to the middle of the lens (a flat LED).
 enum class Emission { kIsotropic, kLambertian };
 
+std::vector<std::pair<std::string, Emission>> named_emissions();
+
+// Kinds of lamps and of parts. Fields, rules and words of each are here and in optical_setup.cpp.
+// Other files ask for a property or visit all kinds, so the compiler names the places that a
+// further kind must fill.
+
+struct LampTraits {
+  const char* type;        ///< In lens.json.
+  const char* name;        ///< On pages.
+  const char* width_key;   ///< Of a source's width in lens.json.
+  const char* width_unit;  ///< "mm"
+  double unit;             ///< rad or mm
+};
+
+struct ParallelLight {
+  static constexpr LampTraits kTraits{"parallel", "parallel light", "angle_mrad", "mrad", 1e-3};
+
+  /// Unit vector before the surface: upwards for a lens, downwards for a mirror.
+  Eigen::Vector3d direction{0.0, 0.0, 1.0};
+
+  // Every kind of lamp has these four functions.
+  /// Place of the lamp, mm; none if it is at infinity.
+  [[nodiscard]] std::optional<Eigen::Vector3d> place() const { return std::nullopt; }
+  /// Place of the lamp, or if at infinity the point of the ray to p that is `away` mm before p.
+  [[nodiscard]] Eigen::Vector3d before(const Eigen::Vector3d& p, double away) const {
+    return p - away * direction;
+  }
+  /// True if the light comes from above `height`, or if not `above` from below 0.
+  [[nodiscard]] bool comes_from(bool above, double /*height*/) const {
+    return above ? direction.z() < 0.0 : direction.z() > 0.0;
+  }
+  /// The same lamp after a rotation about a point.
+  [[nodiscard]] ParallelLight turned(const Eigen::Matrix3d& turn, const Eigen::Vector3d&) const {
+    return {(turn * direction).normalized()};
+  }
+
+  friend bool operator==(const ParallelLight&, const ParallelLight&) = default;
+};
+
 struct PointSource {
-  Eigen::Vector3d position{0.0, 0.0,
-                           0.0};  ///< mm; z < 0 for a lens, above the surface for a mirror.
+  static constexpr LampTraits kTraits{"point", "a point source", "size_mm", "mm", 1.0};
+
+  /// mm; z < 0 for a lens, above the surface for a mirror.
+  Eigen::Vector3d position{0.0, 0.0, 0.0};
   Emission emission = Emission::kIsotropic;
+
+  [[nodiscard]] std::optional<Eigen::Vector3d> place() const { return position; }
+  [[nodiscard]] Eigen::Vector3d before(const Eigen::Vector3d&, double) const { return position; }
+  [[nodiscard]] bool comes_from(bool above, double height) const {
+    return above ? position.z() > height : position.z() < 0.0;
+  }
+  [[nodiscard]] PointSource turned(const Eigen::Matrix3d& turn,
+                                   const Eigen::Vector3d& centre) const {
+    return {centre + turn * (position - centre), emission};
+  }
 
   friend bool operator==(const PointSource&, const PointSource&) = default;
 };
+
+using Lamp = std::variant<ParallelLight, PointSource>;
+
+void describe(Description& d, ParallelLight& lamp);
+void describe(Description& d, PointSource& lamp);
+
+const LampTraits& traits(const Lamp& lamp);
+std::optional<Eigen::Vector3d> lamp_place(const Lamp& lamp);
+Eigen::Vector3d lamp_before(const Lamp& lamp, const Eigen::Vector3d& p, double away);
+
+struct BodyTraits {
+  const char* mode;     ///< In lens.json and for --mode.
+  const char* name;     ///< On pages and in messages.
+  const char* help;     ///< Of --mode.
+  bool transmits;       ///< Light passes the material. Only then are there fronts, colours, losses.
+  bool reflects;        ///< The surface reflects the light.
+  bool lit_from_above;  ///< By a lamp on the screen's side.
+};
+
+/// The surface is the exit face of a lens, with the entry face below it.
+struct LensBody {
+  static constexpr BodyTraits kTraits{"refract", "lens", "a lens", true, false, false};
+  friend bool operator==(const LensBody&, const LensBody&) = default;
+};
+
+/// The surface is a mirror.
+struct MirrorBody {
+  static constexpr BodyTraits kTraits{"reflect", "mirror", "a mirror that is lit from above",
+                                      false,     true,     true};
+  friend bool operator==(const MirrorBody&, const MirrorBody&) = default;
+};
+
+using Body = std::variant<LensBody, MirrorBody>;
+
+const BodyTraits& traits(const Body& body);
+/// Every kind by its word.
+std::vector<std::pair<std::string, Body>> named_bodies();
 
 /// Everything between the lamp and the wall except the surface itself. Millimetres, lens frame.
 /// LightPath derives the rays from it.
@@ -108,14 +198,13 @@ struct PointSource {
 /// the screen is the plane z = focal_length, and image_origin the picture's corner of least x and
 /// y.
 struct OpticalSetup {
-  LightMode mode = LightMode::kRefract;
-  /// Unit direction of parallel light before the surface: upwards for a lens, downwards for a
-  /// mirror.
-  Eigen::Vector3d light{0.0, 0.0, 1.0};
-  std::optional<PointSource> point;  ///< Instead of parallel light.
+  // The fields of parts that transmit light are not members of their kinds: each of those has the
+  // same ones, and a mirror's lens.json states an index.
+  Body body;
+  Lamp lamp;
   /// Entry face of a lens; none: the plane z = 0.
   std::optional<Front> front;
-  SourceExtent extent;  ///< For either kind of source; LightPath treats it as a point.
+  SourceExtent extent;  ///< Of any lamp; LightPath treats it as a point.
   Spectrum spectrum;    ///< Light through a lens; LightPath uses ior for all of it.
   /// True: light that a lens's faces reflect is missing behind them; steeper faces transmit less.
   bool fresnel = false;
@@ -141,6 +230,12 @@ struct OpticalSetup {
 
   friend bool operator==(const OpticalSetup&, const OpticalSetup&) = default;
 };
+
+/// The light for pages: "parallel, straight onto the flat face", "point source at x 1, y 2, z −30
+/// mm", and the width of the lamp.
+std::string lamp_words(const OpticalSetup& setup);
+/// A place for pages: "x 1, y 2, z 3 mm".
+std::string place_words(const Eigen::Vector3d& p);
 
 /// @throw InputError naming the field, its value and the rule, unless ior > 1, all sizes, the focal
 ///        length and the pixel counts are positive, the light comes from the right side, the

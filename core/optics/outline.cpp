@@ -375,7 +375,7 @@ std::vector<TrianglePiece> OutlineIndex::inside(const PlanTriangle& t) const {
   const double whole = doubled_area(t[0], t[1], t[2]);
   std::vector<PlanTriangle> triangles;
   for (Polygon& part : parts_inside(points_, t)) {
-    const std::vector<PlanTriangle> some = triangles_of(std::move(part), kLeastShare * whole);
+    const std::vector<PlanTriangle> some = triangles_of(std::move(part), kMinShare * whole);
     triangles.insert(triangles.end(), some.begin(), some.end());
   }
   std::vector<TrianglePiece> pieces;
@@ -386,11 +386,11 @@ std::vector<TrianglePiece> OutlineIndex::inside(const PlanTriangle& t) const {
       piece.weights.col(k) = weights_of(t, one[static_cast<std::size_t>(k)]);
     }
     piece.share = piece.weights.determinant();
-    if (!(piece.share > kLeastShare)) continue;
+    if (!(piece.share > kMinShare)) continue;
     sum += piece.share;
     pieces.push_back(piece);
   }
-  if (sum > 1.0 - kLeastShare) return {TrianglePiece{}};
+  if (sum > 1.0 - kMinShare) return {TrianglePiece{}};
   return pieces;
 }
 

@@ -78,11 +78,11 @@ class OutlineIndex {
   /// sides touches it.
   [[nodiscard]] Side side_of(const Eigen::AlignedBox2d& box) const;
   /// The exact part of a triangle inside the outline, as triangles that do not overlap: the whole
-  /// triangle if all of it is inside, none if nothing is. A share below kLeastShare counts as
+  /// triangle if all of it is inside, none if nothing is. A share below kMinShare counts as
   /// nothing; a share less than that short of the whole counts as whole.
   [[nodiscard]] std::vector<TrianglePiece> inside(const PlanTriangle& t) const;
 
-  static constexpr double kLeastShare = 1e-12;
+  static constexpr double kMinShare = 1e-12;
 
  private:
   [[nodiscard]] int slab_of(double y) const;

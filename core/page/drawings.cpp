@@ -35,13 +35,7 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr const char* kRay = "stroke=\"#c98a00\" stroke-width=\"1.5\"";
 constexpr const char* kDistance = "stroke=\"#56616b\" stroke-dasharray=\"5 4\"";
 
-bool is_mirror(const OpticalSetup& setup) { return setup.mode == LightMode::kReflect; }
-
 std::string number(double value) { return trimmed_decimal(value, 1); }
-
-std::string place(const Vector3d& p) {
-  return "x " + number(p.x()) + ", y " + number(p.y()) + ", z " + number(p.z()) + " mm";
-}
 
 /// Positions of all objects, mm in the lens frame.
 struct Scene {
@@ -53,7 +47,7 @@ struct Scene {
         across(0.5 * setup.image_size.x() * setup.screen_x),
         upwards(0.5 * setup.image_size.y() * setup.screen_y),
         normal(setup.screen_x.cross(setup.screen_y)),
-        lamp(setup.point ? setup.point->position : Vector3d(middle - 1.5 * unit * setup.light)) {
+        lamp(lamp_before(setup.lamp, middle, 1.5 * unit)) {
     const double side = setup.view == ViewSide::kFront ? -1.0 : 1.0;
     eye = centre + 0.3 * (centre - middle).norm() * side * normal + 1.4 * upwards;
     double farthest = 0.0;
@@ -170,9 +164,9 @@ std::string distance(const View& view, const Vector3d& from, const Vector3d& to)
 }
 
 std::string lamp(const OpticalSetup& setup, const Scene& scene, const View& view) {
-  if (!setup.point) {
+  if (!lamp_place(setup.lamp)) {
     const Vector2d lowest = view.at(scene.beside(scene.lamp, view.up(), -1.0));
-    return words(lowest + Vector2d(0.0, kLine), "parallel light", "text-anchor=\"middle\"");
+    return words(lowest + Vector2d(0.0, kLine), traits(setup.lamp).name, "text-anchor=\"middle\"");
   }
   const Vector2d at = view.at(scene.lamp);
   return distance(view, scene.lamp, scene.middle) + dot(at, 6.0, "#ffcf4d") +
@@ -184,7 +178,8 @@ std::string rays(const OpticalSetup& setup, const Scene& scene, const View& view
   std::string svg;
   for (const double side : {-1.0, 1.0}) {
     const Vector3d edge = scene.beside(scene.middle, view.up(), side);
-    const Vector3d from = setup.point ? scene.lamp : scene.beside(scene.lamp, view.up(), side);
+    const Vector3d from =
+        lamp_place(setup.lamp) ? scene.lamp : scene.beside(scene.lamp, view.up(), side);
     const Vector3d half = view.up() == 0 ? scene.across : scene.upwards;
     svg += line(view.at(from), view.at(edge), std::string(kRay) + " marker-end=\"url(#tip)\"") +
            line(view.at(edge), view.at(scene.centre + side * half), kRay);
@@ -215,7 +210,7 @@ std::string part(const OpticalSetup& setup, const Scene& scene, const View& view
   if (setup.front) outline = front_line(setup, scene, view);
   outline.insert(outline.end(), {b, {b.x(), a.y()}});
   return polygon(outline, "fill=\"#b9d3ea\" stroke=\"#0b5cad\" stroke-width=\"1.5\"") +
-         words({b.x(), std::max(a.y(), b.y()) + kLine}, is_mirror(setup) ? "mirror" : "lens",
+         words({b.x(), std::max(a.y(), b.y()) + kLine}, traits(setup.body).name,
                "text-anchor=\"middle\"");
 }
 
@@ -246,32 +241,6 @@ std::string drawn(const OpticalSetup& setup, const Scene& scene, const View& vie
          lamp(setup, scene, view) + viewer(scene, view);
 }
 
-std::string direction_words(const OpticalSetup& setup) {
-  if (setup.point) {
-    return std::string(setup.point->emission == Emission::kIsotropic
-                           ? "point source"
-                           : "flat LED, towards the middle of the part,") +
-           " at " + place(setup.point->position);
-  }
-  if (!is_mirror(setup)) {
-    return std::string("parallel, straight onto the ") + (setup.front ? "front" : "flat face");
-  }
-  return "parallel, " + number(std::acos(std::clamp(-setup.light.z(), -1.0, 1.0)) / kDegree) +
-         "° from the mirror's z axis";
-}
-
-/// Width of the source; empty for a point.
-std::string extent_words(const OpticalSetup& setup) {
-  constexpr double kMilliradian = 1e-3;
-  if (setup.extent.none()) return "";
-  const double width = setup.extent.width;
-  const std::string size = setup.point ? trimmed_decimal(width, 2) + " mm"
-                                       : trimmed_decimal(width / kMilliradian, 2) + " mrad (" +
-                                             trimmed_decimal(width / kDegree, 2) + "°)";
-  return setup.extent.shape.is_disc() ? ", a disc " + size + " wide"
-                                      : ", a shape of its own " + size + " wide";
-}
-
 std::string front_words(const OpticalSetup& setup) {
   if (!setup.front) return "its flat face at z 0, towards the lamp";
   if (std::holds_alternative<HeightFront>(*setup.front)) {
@@ -284,13 +253,14 @@ std::string front_words(const OpticalSetup& setup) {
 
 std::vector<std::string> description(const OpticalSetup& setup, const Scene& scene) {
   const double tilt = std::acos(std::clamp(scene.normal.z(), -1.0, 1.0)) / kDegree;
-  return {(is_mirror(setup) ? "Mirror: " : "Lens: ") + number(setup.lens_size.x()) + " × " +
+  return {capitalised(traits(setup.body).name) + ": " + number(setup.lens_size.x()) + " × " +
               number(setup.lens_size.y()) + " mm, its lower left corner at x 0, y 0, " +
               (setup.outline ? outline_words(*setup.outline) + ", " : "") +
-              (is_mirror(setup) ? "its shaped side towards lamp and screen" : front_words(setup)),
-          "Light: " + direction_words(setup) + extent_words(setup),
+              (traits(setup.body).transmits ? front_words(setup)
+                                            : "its shaped side towards lamp and screen"),
+          "Light: " + lamp_words(setup),
           "Picture: " + number(setup.image_size.x()) + " × " + number(setup.image_size.y()) +
-              " mm, its centre at " + place(scene.centre),
+              " mm, its centre at " + place_words(scene.centre),
           std::string("Screen: ") + (setup.screen_is_turned()
                                          ? "tilted by " + number(tilt) + "° from the part's plane"
                                          : "parallel to the part"),

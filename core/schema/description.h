@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -40,19 +42,20 @@ struct Limits {
 };
 
 enum class FieldKind {
-  kFlag,    ///< bool
-  kWhole,   ///< int
-  kNumber,  ///< double
-  kLength,  ///< double, mm
-  kWord,    ///< One of a few words.
-  kText,    ///< A text or several.
-  kTable,   ///< Another struct.
-  kList,    ///< Any number of another struct.
+  kFlag,     ///< bool
+  kWhole,    ///< int
+  kNumber,   ///< double
+  kLength,   ///< double, mm
+  kWord,     ///< One of a few words.
+  kText,     ///< A text or several.
+  kNumbers,  ///< Several doubles; in JSON only.
+  kTable,    ///< Another struct.
+  kList,     ///< Any number of another struct.
 };
 
 /// Value of a field; none if the object has no place for it.
-using FieldValue =
-    std::variant<std::monostate, bool, int, double, std::string, std::vector<std::string>>;
+using FieldValue = std::variant<std::monostate, bool, int, double, std::string,
+                                std::vector<std::string>, std::vector<double>>;
 
 /// @pre the value is a number.
 double number_of(const FieldValue& value);
@@ -65,8 +68,9 @@ struct FieldSpec {
   Limits limits = {};                   ///< Numbers only.
   std::string unit = {};                ///< For a number: "rpm"; for a text its kind: "FILE.toml".
   std::vector<std::string> words = {};  ///< Allowed words.
+  std::size_t count = 0;                ///< Of several numbers; 0: any.
   bool needed = false;                  ///< Must be given.
-  bool zero_if_missing = false;         ///< Also allows 0, which files leave out.
+  bool zero_if_missing = false;         ///< Also allows 0 or an empty list, which files leave out.
   std::string left_out = {};            ///< Why a fingerprint omits it; empty if it does not.
 
   [[nodiscard]] bool is_number() const {
@@ -136,6 +140,9 @@ class Description {
               const std::function<void(const std::string&)>& set);
   Field& texts(const std::string& name, const Place<std::vector<std::string>>& at,
                const std::string& unit, const std::string& help);
+  /// @param numbers  a vector, or one of fixed size.
+  template <class Numbers>
+  Field& numbers(const std::string& name, Numbers& numbers, const std::string& help);
   template <class Value>
   Field& word(const std::string& name, Value& value,
               const Choices<std::type_identity_t<Value>>& choices, const std::string& help);
@@ -192,6 +199,24 @@ Description description_of(const Object& object) {
 template <class Object>
 void require_limits(const Object& object) {
   description_of(object).require_limits();
+}
+
+template <class Numbers>
+Field& Description::numbers(const std::string& name, Numbers& numbers, const std::string& help) {
+  Field field{{.name = name, .kind = FieldKind::kNumbers, .help = help}};
+  constexpr bool kFixed = requires { Numbers::SizeAtCompileTime; };
+  if constexpr (kFixed) field.count = Numbers::SizeAtCompileTime;
+  field.get = [&numbers] {
+    return FieldValue(std::vector<double>(numbers.begin(), numbers.end()));
+  };
+  field.set = [&numbers](const FieldValue& given) {
+    const auto& list = std::get<std::vector<double>>(given);
+    if constexpr (kFixed)
+      std::copy(list.begin(), list.end(), numbers.begin());
+    else
+      numbers = list;
+  };
+  return add(std::move(field));
 }
 
 template <class Value>

@@ -2,6 +2,7 @@
 #include "core/schema/json.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -130,22 +131,23 @@ bool JsonFields::flag(const std::string& name) const {
   return at(name).get<bool>();
 }
 
-Eigen::Vector2d JsonFields::number_pair(const std::string& name) const {
+std::vector<double> JsonFields::numbers(const std::string& name, std::size_t count) const {
+  constexpr std::array kRules{"a list of numbers", "a number", "two numbers", "three numbers"};
   const json& value = at(name);
-  if (!is_pair(value) || !value[0].is_number() || !value[1].is_number()) {
-    refuse(name, "it must be two numbers");
+  const auto is_number = [](const json& entry) { return entry.is_number(); };
+  if (!value.is_array() || (count > 0 && value.size() != count) ||
+      !std::all_of(value.begin(), value.end(), is_number)) {
+    refuse(name, std::string("it must be ") + kRules.at(count));
   }
-  return {value[0].get<double>(), value[1].get<double>()};
+  return value.get<std::vector<double>>();
+}
+
+Eigen::Vector2d JsonFields::number_pair(const std::string& name) const {
+  return Eigen::Vector2d(numbers(name, 2).data());
 }
 
 Eigen::Vector3d JsonFields::number_triple(const std::string& name) const {
-  const json& value = at(name);
-  const auto is_number = [](const json& entry) { return entry.is_number(); };
-  if (!value.is_array() || value.size() != 3 ||
-      !std::all_of(value.begin(), value.end(), is_number)) {
-    refuse(name, "it must be three numbers");
-  }
-  return {value[0].get<double>(), value[1].get<double>(), value[2].get<double>()};
+  return Eigen::Vector3d(numbers(name, 3).data());
 }
 
 Eigen::Vector2i JsonFields::integer_pair(const std::string& name) const {
@@ -180,7 +182,8 @@ ordered_json json_of(const Description& description) {
       ordered_json& list = object[field.name] = ordered_json::array();
       for (const Description& item : field.parts()) list.push_back(json_of(item));
     } else if (const FieldValue value = field.get();
-               !field.zero_if_missing || value != FieldValue(0.0)) {
+               !field.zero_if_missing ||
+               (value != FieldValue(0.0) && value != FieldValue(std::vector<double>()))) {
       object[field.name] = json_of(value);
     }
   }
@@ -200,6 +203,7 @@ FieldValue value_in(const JsonFields& fields, const Field& field) {
   if (field.kind == FieldKind::kFlag) return fields.flag(name);
   if (field.kind == FieldKind::kWhole) return fields.integer(name);
   if (field.is_number()) return fields.number(name);
+  if (field.kind == FieldKind::kNumbers) return fields.numbers(name, field.count);
   const std::string text = fields.text(name);
   if (field.kind == FieldKind::kText) return text;
   std::string rule = "it must be";

@@ -6,6 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/schema/description.h"
 
@@ -43,6 +44,8 @@ class JsonFields {
   [[nodiscard]] double number(const std::string& name) const;
   [[nodiscard]] int integer(const std::string& name) const;
   [[nodiscard]] bool flag(const std::string& name) const;
+  /// @param count  of numbers, 2 or 3; 0: any.
+  [[nodiscard]] std::vector<double> numbers(const std::string& name, std::size_t count = 0) const;
   [[nodiscard]] Eigen::Vector2d number_pair(const std::string& name) const;
   [[nodiscard]] Eigen::Vector3d number_triple(const std::string& name) const;
   [[nodiscard]] Eigen::Vector2i integer_pair(const std::string& name) const;
@@ -56,13 +59,23 @@ class JsonFields {
   std::string prefix_;
 };
 
-/// A described object, its fields in the description's order. Numbers that 0 stands for are left
-/// out.
+/// A described object, its fields in the description's order. Numbers and lists that a missing
+/// field stands for are left out.
 nlohmann::ordered_json json_of(const Description& description);
 
 /// Reads it back: a field that is not needed keeps its value if it is missing. @throw InputError
 /// naming file, field, value and rule.
 void read_json(const Description& description, const JsonFields& fields);
+
+/// The value that a field's word stands for.
+template <class Value>
+Value word_in(const JsonFields& fields, const std::string& name, const Choices<Value>& choices) {
+  Value value{};
+  Description description;
+  description.word(name, value, choices, "").needed = true;
+  read_json(description, fields);
+  return value;
+}
 
 /// Appends the values that a fingerprint holds to an array.
 void append_fingerprint(const Description& description, nlohmann::json& array);

@@ -20,7 +20,7 @@ namespace lensforge {
 namespace {
 
 constexpr std::size_t kLongestText = 200;
-constexpr std::size_t kMostEdits = 2;  ///< Maximum for a mistyped key: two letters swapped.
+constexpr std::size_t kMaxEdits = 2;  ///< Maximum for a mistyped key: two letters swapped.
 
 /// The value as in the file; for a table or array only its kind.
 std::string shown(const toml::node* value) {
@@ -52,9 +52,9 @@ std::size_t edits_between(std::string_view a, std::string_view b) {
 /// The known key that was most likely meant; empty if none is near.
 std::string likely_key(const std::string& key, const std::set<std::string>& known) {
   std::string likely;
-  std::size_t least = kMostEdits + 1;
+  std::size_t least = kMaxEdits + 1;
   for (const std::string& candidate : known) {
-    if (key.size() > candidate.size() + kMostEdits) continue;
+    if (key.size() > candidate.size() + kMaxEdits) continue;
     const std::size_t edits = edits_between(key, candidate);
     if (edits >= least || edits >= candidate.size()) continue;
     likely = candidate;

@@ -136,9 +136,9 @@ SampledSurface spline_rows(const ControlNet& net, int samples, int first, int la
 int samples_for(double nodes, double cells) {
   // More do not change a picture: with 12, 64² splines of 29,000 cells have the same MAE to
   // 0.00001.
-  constexpr double kMostOfCell = 8.0 * 8.0;
+  constexpr double kMaxNodesOfCell = 8.0 * 8.0;
   constexpr double kNodesOfFewCells = 250e3;
-  const double useful = std::max(kMostOfCell * cells, kNodesOfFewCells);
+  const double useful = std::max(kMaxNodesOfCell * cells, kNodesOfFewCells);
   const double samples = std::ceil(std::sqrt(std::min(nodes, useful) / cells));
   return static_cast<int>(std::clamp(samples, 2.0, 256.0));
 }

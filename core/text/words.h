@@ -16,6 +16,12 @@ inline std::string joined(std::initializer_list<std::string_view> texts) {
   return all;
 }
 
+/// The text with a capital letter first.
+inline std::string capitalised(std::string text) {
+  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 32);
+  return text;
+}
+
 /// The words of a range with `between` between them. @param words  strings or views of them.
 template <class Words>
 std::string joined(const Words& words, std::string_view between) {

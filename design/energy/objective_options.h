@@ -84,12 +84,12 @@ struct AreaBarrier {
 /// Minimum projected area of a facet, as a share of the mean. Dark parts need small facets (a
 /// facet's flux is its projected area); a thousandth of the mean still divides without loss of
 /// digits.
-inline constexpr double kLeastArea = 0.001;
+inline constexpr double kMinArea = 0.001;
 
 /// Thresholds of the area barrier for a mesh of `triangles` triangles over the lens.
 /// @param least  ε1 as a share of the mean projected triangle; ε2 is five times that.
 AreaBarrier default_area_barrier(const OpticalSetup& setup, std::int64_t triangles,
-                                 double least = kLeastArea);
+                                 double least = kMinArea);
 
 struct ObjectiveOptions {
   ObjectiveWeights weights;

@@ -27,8 +27,8 @@ namespace {
 using std::chrono::steady_clock;
 
 /// Limits per call: MPI counts in int.
-constexpr std::size_t kMostBytes = std::size_t{1} << 30;
-constexpr std::size_t kMostWords = std::size_t{1} << 27;
+constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
+constexpr std::size_t kMaxWords = std::size_t{1} << 27;
 
 /// Sleep of a rank without work between two checks; the work then takes far longer.
 constexpr std::chrono::microseconds kNap{200};
@@ -110,7 +110,7 @@ Ranks Ranks::world() {
 void Ranks::broadcast_bytes(void* data, std::size_t bytes, int from) const {
   const CountedCall call(rank_ == from ? bytes : 0);
   auto* const first = static_cast<char*>(data);
-  in_parts(bytes, kMostBytes, [&](std::size_t begin, int length) {
+  in_parts(bytes, kMaxBytes, [&](std::size_t begin, int length) {
     MPI_Bcast(first + begin, length, MPI_BYTE, from, MPI_COMM_WORLD);
   });
 }
@@ -128,7 +128,7 @@ void Ranks::await_bytes(void* data, std::size_t bytes) const {
 
 void Ranks::add_up(std::span<std::uint64_t> entries) const {
   const CountedCall call(entries.size_bytes());
-  in_parts(entries.size(), kMostWords, [&](std::size_t begin, int length) {
+  in_parts(entries.size(), kMaxWords, [&](std::size_t begin, int length) {
     MPI_Allreduce(MPI_IN_PLACE, entries.data() + begin, length, MPI_UINT64_T, MPI_SUM,
                   MPI_COMM_WORLD);
   });
@@ -156,14 +156,14 @@ void Ranks::collect_parts(std::span<double> entries, std::span<const int> counts
 void Ranks::send_bytes(int to, const void* data, std::size_t bytes) const {
   const CountedCall call(bytes);
   const auto* const first = static_cast<const char*>(data);
-  in_parts(bytes, kMostBytes, [&](std::size_t begin, int length) {
+  in_parts(bytes, kMaxBytes, [&](std::size_t begin, int length) {
     MPI_Send(first + begin, length, MPI_BYTE, to, kTag, MPI_COMM_WORLD);
   });
 }
 
 void Ranks::receive_bytes(int from, void* data, std::size_t bytes) const {
   auto* const first = static_cast<char*>(data);
-  in_parts(bytes, kMostBytes, [&](std::size_t begin, int length) {
+  in_parts(bytes, kMaxBytes, [&](std::size_t begin, int length) {
     MPI_Recv(first + begin, length, MPI_BYTE, from, kTag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
   });
 }
@@ -214,65 +214,87 @@ void Ranks::abort(const std::string& reason) const {
 
 namespace {
 
-template <int Size, class T>
-void put_vector(const Eigen::Matrix<T, Size, 1>& vector, Parcel& parcel) {
-  for (const T entry : vector) parcel.put(entry);
-}
-template <class Vector>
-void take_vector(Vector& vector, Parcel& parcel) {
-  for (auto& entry : vector) parcel.take(entry);
-}
+template <class Struct, class... Others>
+constexpr bool kIsOneOf = (std::is_same_v<Struct, Others> || ...);
 
-void put_front(const Front& front, Parcel& parcel) {
-  const auto* const map = std::get_if<HeightFront>(&front);
-  parcel.put(map != nullptr);
-  if (map == nullptr) {
-    const auto& sphere = std::get<SphericalFront>(front);
-    parcel.put(sphere.radius);
-    put_vector(sphere.apex, parcel);
-    return;
+/// Visits all members of a struct. A structured binding names them: a struct with another member
+/// does not compile here, so none is forgotten.
+template <class Struct, class Visit>
+void visit_members(Struct& object, const Visit& visit) {
+  if constexpr (kIsOneOf<Struct, ParallelLight>) {
+    auto& [a] = object;
+    visit(a);
+  } else if constexpr (kIsOneOf<Struct, PointSource, SphericalFront, SourceExtent>) {
+    auto& [a, b] = object;
+    visit(a, b);
+  } else if constexpr (kIsOneOf<Struct, OpticalSetup>) {
+    auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = object;
+    visit(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p);
+  } else {
+    auto& [a, b, c] = object;
+    visit(a, b, c);
   }
-  const HeightGrid& grid = map->spline->grid();
-  parcel.put(grid.columns);
-  parcel.put(grid.rows);
-  parcel.put_all(grid.heights);
-  put_vector(map->size, parcel);
-  put_vector(map->corner, parcel);
 }
 
-Front take_front(Parcel& parcel) {
-  if (!parcel.take<bool>()) {
-    SphericalFront sphere;
-    parcel.take(sphere.radius);
-    take_vector(sphere.apex, parcel);
-    return sphere;
+/// Puts values into a parcel or takes them out again, by the same calls.
+class Transfer {
+ public:
+  enum class Way { kPut, kTake };
+
+  Transfer(Parcel& parcel, Way way) : parcel_(parcel), takes_(way == Way::kTake) {}
+
+  template <class... Values>
+  void operator()(Values&... values) const {
+    (pass(values), ...);
   }
-  HeightGrid grid;
-  parcel.take(grid.columns);
-  parcel.take(grid.rows);
-  grid.heights = parcel.take_all<float>();
-  HeightFront map;
-  map.spline = std::make_shared<HeightSpline>(std::move(grid));
-  take_vector(map.size, parcel);
-  take_vector(map.corner, parcel);
-  return map;
-}
 
-void put_outline(const Outline& outline, Parcel& parcel) {
-  parcel.put(outline.kind);
-  parcel.put(outline.radius);
-  parcel.put(outline.points.size());
-  for (const Eigen::Vector2d& point : outline.points) put_vector(point, parcel);
-}
+ private:
+  template <class Value>
+  void pass(Value& value) const {
+    if constexpr (std::is_trivially_copyable_v<Value>)
+      takes_ ? parcel_.take(value) : parcel_.put(value);
+    else
+      visit_members(value, *this);
+  }
+  template <class T, int Size>
+  void pass(Eigen::Matrix<T, Size, 1>& vector) const {
+    for (T& entry : vector) pass(entry);
+  }
+  template <class Item>
+  void pass(std::vector<Item>& items) const {
+    if constexpr (std::is_trivially_copyable_v<Item>) {
+      takes_ ? void(items = parcel_.take_all<Item>()) : parcel_.put_all(items);
+      return;
+    }
+    std::size_t size = items.size();
+    pass(size);
+    items.resize(size);
+    for (Item& item : items) pass(item);
+  }
+  template <class Value>
+  void pass(std::optional<Value>& value) const {
+    bool has = value.has_value();
+    pass(has);
+    if (has && takes_) value.emplace();
+    if (has) pass(*value);
+  }
+  template <class... Kinds>
+  void pass(std::variant<Kinds...>& value) const {
+    std::size_t index = value.index();
+    pass(index);
+    std::size_t kind = 0;
+    if (takes_) ((kind++ == index ? void(value.template emplace<Kinds>()) : void()), ...);
+    std::visit([this](auto& held) { pass(held); }, value);
+  }
+  void pass(std::shared_ptr<const HeightSpline>& spline) const {
+    HeightGrid grid = takes_ ? HeightGrid() : spline->grid();
+    pass(grid);
+    if (takes_) spline = std::make_shared<HeightSpline>(std::move(grid));
+  }
 
-Outline take_outline(Parcel& parcel) {
-  Outline outline;
-  parcel.take(outline.kind);
-  parcel.take(outline.radius);
-  outline.points.resize(parcel.take<std::size_t>());
-  for (Eigen::Vector2d& point : outline.points) take_vector(point, parcel);
-  return outline;
-}
+  Parcel& parcel_;
+  bool takes_;
+};
 
 void put_image(const Image& image, Parcel& parcel) {
   parcel.put(image.columns());
@@ -288,32 +310,14 @@ Image take_image(Parcel& parcel) {
   return image;
 }
 
-void put_options(const ObjectiveOptions& options, Parcel& parcel) {
-  LF_CHECK(!options.made_by, "");
-  parcel.put(options.weights);
-  parcel.put(options.model);
-  parcel.put(options.nu);
-  parcel.put(options.area);
-  parcel.put(options.surface_height);
-}
-
-ObjectiveOptions take_options(Parcel& parcel) {
-  ObjectiveOptions options;
-  parcel.take(options.weights);
-  parcel.take(options.model);
-  parcel.take(options.nu);
-  parcel.take(options.area);
-  parcel.take(options.surface_height);
-  return options;
-}
-
 /// The parts of a problem that every rank has.
 Parcel common_part(const StageProblem& problem) {
   Parcel parcel;
   parcel.put(problem.mesh.grid);
   put_setup(problem.setup, parcel);
   parcel.put(problem.aspect);
-  put_options(problem.options, parcel);
+  LF_CHECK(!problem.options.made_by, "");
+  parcel.put(problem.options);
   const auto* const picture = std::get_if<Image>(&problem.goal);
   parcel.put(picture != nullptr);
   if (picture != nullptr) put_image(*picture, parcel);
@@ -352,64 +356,13 @@ Matrix held_columns(const Matrix* whole, const Ranks& ranks, Eigen::Index rows,
 }  // namespace
 
 void put_setup(const OpticalSetup& setup, Parcel& parcel) {
-  parcel.put(setup.mode);
-  put_vector(setup.light, parcel);
-  parcel.put(setup.point.has_value());
-  if (setup.point) {
-    put_vector(setup.point->position, parcel);
-    parcel.put(setup.point->emission);
-  }
-  parcel.put(setup.front.has_value());
-  if (setup.front) put_front(*setup.front, parcel);
-  parcel.put(setup.extent.width);
-  parcel.put(setup.extent.shape.columns);
-  parcel.put(setup.extent.shape.rows);
-  parcel.put_all(setup.extent.shape.weights);
-  parcel.put_all(setup.spectrum.wavelengths);
-  parcel.put_all(setup.spectrum.powers);
-  parcel.put(setup.spectrum.abbe);
-  parcel.put(setup.fresnel);
-  parcel.put(setup.ior);
-  parcel.put(setup.focal_length);
-  put_vector(setup.lens_size, parcel);
-  parcel.put(setup.outline.has_value());
-  if (setup.outline) put_outline(*setup.outline, parcel);
-  put_vector(setup.image_size, parcel);
-  put_vector(setup.image_origin, parcel);
-  put_vector(setup.screen_x, parcel);
-  put_vector(setup.screen_y, parcel);
-  put_vector(setup.pixels, parcel);
-  parcel.put(setup.view);
+  OpticalSetup copy = setup;
+  Transfer(parcel, Transfer::Way::kPut)(copy);
 }
 
 OpticalSetup take_setup(Parcel& parcel) {
   OpticalSetup setup;
-  parcel.take(setup.mode);
-  take_vector(setup.light, parcel);
-  if (parcel.take<bool>()) {
-    setup.point.emplace();
-    take_vector(setup.point->position, parcel);
-    parcel.take(setup.point->emission);
-  }
-  if (parcel.take<bool>()) setup.front = take_front(parcel);
-  parcel.take(setup.extent.width);
-  parcel.take(setup.extent.shape.columns);
-  parcel.take(setup.extent.shape.rows);
-  setup.extent.shape.weights = parcel.take_all<double>();
-  setup.spectrum.wavelengths = parcel.take_all<double>();
-  setup.spectrum.powers = parcel.take_all<double>();
-  parcel.take(setup.spectrum.abbe);
-  parcel.take(setup.fresnel);
-  parcel.take(setup.ior);
-  parcel.take(setup.focal_length);
-  take_vector(setup.lens_size, parcel);
-  if (parcel.take<bool>()) setup.outline = take_outline(parcel);
-  take_vector(setup.image_size, parcel);
-  take_vector(setup.image_origin, parcel);
-  take_vector(setup.screen_x, parcel);
-  take_vector(setup.screen_y, parcel);
-  take_vector(setup.pixels, parcel);
-  parcel.take(setup.view);
+  Transfer(parcel, Transfer::Way::kTake)(setup);
   return setup;
 }
 
@@ -419,7 +372,7 @@ StageProblem share_problem(const StageProblem* whole, const Ranks& ranks, GridSh
   StageProblem part;
   part.setup = take_setup(parcel);
   parcel.take(part.aspect);
-  part.options = take_options(parcel);
+  parcel.take(part.options);
   const auto faces = [&](int r) { return RowSlab(grid, ranks.count(), r).held_faces(); };
   const auto vertices = [&](int r) { return RowSlab(grid, ranks.count(), r).held_vertices(); };
   if (parcel.take<bool>()) {

@@ -114,7 +114,7 @@ struct FullFaces {
 /// Minimum area of a face, as a share of the square of its longest side: at 1e-9 a face is a
 /// thousand million times as long as it is wide, which single precision cannot distinguish from a
 /// line.
-constexpr double kLeastFlatness = 1e-9;
+constexpr double kMinFlatness = 1e-9;
 
 /// Maximum number of passes: collinear faces may have to wait for each other. Those left then are
 /// dropped.
@@ -126,7 +126,7 @@ Eigen::Vector3d squared_sides(const Corners& c) {
 
 bool is_flat(const SurfaceMesh& mesh, Eigen::Index face) {
   const Corners c = mesh.corners(face);
-  return !(area_normal(c).norm() > kLeastFlatness * squared_sides(c).maxCoeff());
+  return !(area_normal(c).norm() > kMinFlatness * squared_sides(c).maxCoeff());
 }
 
 bool has_corner_twice(const SurfaceMesh& mesh, Eigen::Index face) {
@@ -203,7 +203,7 @@ FullFaces without_flat_faces(const SurfaceMesh& mesh) {
 }
 
 /// Limits of the bounding box's diagonal; its square is still far from the limits of doubles.
-constexpr double kLeastDiagonal = 1e-60;
+constexpr double kMinDiagonal = 1e-60;
 constexpr double kGreatestDiagonal = 1e60;
 
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
@@ -278,7 +278,7 @@ void merge_vertices(const SurfaceMesh& mesh, RepairedMesh& result) {
 
 void require_size(const SurfaceMesh& mesh, const std::string& name) {
   const double diagonal = bounding_diagonal(mesh);
-  if (diagonal >= kLeastDiagonal && diagonal <= kGreatestDiagonal) return;
+  if (diagonal >= kMinDiagonal && diagonal <= kGreatestDiagonal) return;
   refuse(name, "the box around it has a diagonal of " + number_text(diagonal) +
                    ": must be 1e-60 to 1e+60; state it in millimetres");
 }

@@ -369,8 +369,8 @@ class Schedule {
 }  // namespace
 
 bool gained_enough(GoalKind goal, double before, double after) {
-  if (Goal{.kind = goal}.maximizes()) return after > 0.0 && after >= (1.0 + kLeastGain) * before;
-  return before <= kLittleEnergy ? after <= kLittleEnergy : after <= (1.0 - kLeastGain) * before;
+  if (Goal{.kind = goal}.maximizes()) return after > 0.0 && after >= (1.0 + kMinGain) * before;
+  return before <= kLittleEnergy ? after <= kLittleEnergy : after <= (1.0 - kMinGain) * before;
 }
 
 ReflectResult reflect_shape(const ReflectInput& input, const ReflectOptions& options,

@@ -52,7 +52,7 @@ struct ReflectResult {
 
 /// Minimum gain of a finished run: a tenth of the energy before, as a loss, or as a gain for goals
 /// that ask for light. If light is unwanted, an energy below kLittleEnergy needs no gain.
-inline constexpr double kLeastGain = 0.1;
+inline constexpr double kMinGain = 0.1;
 /// A hundredth of a sphere's energy (0.0875). Optimised shapes have a few times this; a shape of
 /// flat faces that all look past the light has less.
 inline constexpr double kLittleEnergy = 1e-3;

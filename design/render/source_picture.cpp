@@ -112,7 +112,7 @@ namespace {
 
 /// Minimum light of a pixel at the start, relative to the mean: a pixel that starts without light
 /// can never get any.
-constexpr double kLeastStart = 1e-4;
+constexpr double kMinStart = 1e-4;
 
 /// Limits of the search (64² portrait, source of 2.2 pixels: MAE 0.0021 after 3 s).
 constexpr int kMaxIterations = 400;
@@ -169,7 +169,7 @@ class LimitObjective {
 
 /// The target's light, spread evenly over the parts of a pixel.
 std::vector<double> start_from(const Image& target, int parts) {
-  const double least = kLeastStart * target.total() / static_cast<double>(target.values().size());
+  const double least = kMinStart * target.total() / static_cast<double>(target.values().size());
   std::vector<double> q;
   for (int row = 0; row < parts * target.rows(); ++row) {
     for (int column = 0; column < parts * target.columns(); ++column) {

@@ -42,7 +42,7 @@ WantedPicture::WantedPicture(const SurfaceMesh& mesh, const OpticalSetup& setup,
       target_(target),
       executor_(executor),
       reach_(LightPath(setup).reach(1.0, mesh.vertices.row(2).mean()) *
-             (setup.mode == LightMode::kReflect ? -1.0 : 1.0)) {
+             (traits(setup.body).reflects ? -1.0 : 1.0)) {
   mae_ = evaluate(mesh, setup, SurfaceModel::kSmooth, target, &wanted_, executor).mae;
 }
 

@@ -72,14 +72,14 @@ namespace {
 
 /// A face with less than this share of its light inside the outline counts as dark. Cells that hold
 /// almost no light hold up all others.
-constexpr double kLeastShare = 0.05;
+constexpr double kMinShare = 0.05;
 
 /// Sets the flux of faces almost entirely outside the outline to 0.
 void drop_slivers(const SurfaceMesh& mesh, const Outline& outline, const Executor& executor,
                   Eigen::VectorXd& flux) {
   const MeshCut cut = cut_mesh(mesh, outline, executor);
   for (Eigen::Index f = 0; f < flux.size(); ++f) {
-    if (cut.share[static_cast<std::size_t>(f)] < kLeastShare) flux[f] = 0.0;
+    if (cut.share[static_cast<std::size_t>(f)] < kMinShare) flux[f] = 0.0;
   }
 }
 

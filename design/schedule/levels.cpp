@@ -212,7 +212,7 @@ namespace {
 
 /// Maximum number of sweeps over the vertices of small triangles alone; interpolated meshes took 8.
 /// After that all vertices move, which ends in a mesh without folds (Tutte 1963).
-constexpr int kMostSweeps = 50;
+constexpr int kMaxSweeps = 50;
 
 using Marks = std::vector<char>;
 
@@ -272,7 +272,7 @@ void even_out(double least, SurfaceMesh& mesh) {
   for (int sweep = 0;; ++sweep) {
     const Marks small = vertices_of_small_triangles(mesh, least);
     if (std::find(small.begin(), small.end(), 1) == small.end()) return;
-    evening.sweep(sweep < kMostSweeps ? small : all_vertices(mesh));
+    evening.sweep(sweep < kMaxSweeps ? small : all_vertices(mesh));
   }
 }
 
@@ -338,8 +338,8 @@ ControlNet settled(ControlNet net, double thickness) {
 namespace {
 
 /// Minimum area of a triangle at a level's start, as a share of the mean. Aligning to creases may
-/// leave a tenth of it, which is still above kLeastArea.
-constexpr double kLeastOfStart = 0.02;
+/// leave a tenth of it, which is still above kMinArea.
+constexpr double kMinStartShare = 0.02;
 
 /// Number of steps of draw_towards().
 constexpr int kDrawingSteps = 10;
@@ -371,7 +371,7 @@ SurfaceMesh level_start(const DesignTask& task, const Level& level, const Surfac
   if (level.spline) return spline_start(task, level, mesh);
   SurfaceMesh fine = regrid(mesh, task.setup.lens_size, level.grid);
   const auto triangles = static_cast<double>(fine.triangle_count());
-  even_out(kLeastOfStart * task.setup.lens_size.prod() / triangles, fine);
+  even_out(kMinStartShare * task.setup.lens_size.prod() / triangles, fine);
   return fine;
 }
 

@@ -25,9 +25,9 @@ struct Level {
   double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
   bool spline = false;           ///< The mesh's vertices are control points of a spline.
   double knot_share = 1.0;  ///< Share of the vertices' displacement that its knots take part in.
-  double least_area = kLeastArea;  ///< Of a triangle, as a share of the mean (AreaBarrier).
-  int rounds = 0;                  ///< Alternations.
-  int iterations = 0;              ///< Maximum of one round.
+  double least_area = kMinArea;  ///< Of a triangle, as a share of the mean (AreaBarrier).
+  int rounds = 0;                ///< Alternations.
+  int iterations = 0;            ///< Maximum of one round.
 };
 
 /// Size of the working picture: the longer side has options.pixels, the other is at least 1 and

@@ -40,7 +40,7 @@ enum class SourceKind { kParallel, kPoint };
 
 /// Light source, kind of surface (lens or mirror), and place of the picture.
 struct LightOptions {
-  LightMode mode = LightMode::kRefract;
+  Body body;               ///< Lens or mirror.
   double incidence = 0.0;  ///< Angle of parallel light from a mirror's z axis, degrees, in x.
   SourceKind source = SourceKind::kParallel;
   std::optional<double> front_radius;                 ///< Radius, mm; above 0: convex; none: flat.
@@ -159,7 +159,7 @@ void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels);
 
 /// Minimum share of the lens's rectangle that an outline covers: below it nearly the whole mesh is
 /// dark.
-inline constexpr double kLeastOutlineShare = 0.05;
+inline constexpr double kMinOutlineShare = 0.05;
 
 /// Pixels of the longer side at which an SVG file is drawn to find its outline.
 inline constexpr int kOutlineDrawing = 2048;

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <system_error>
+#include <variant>
 #include <vector>
 
 #include "core/compute/scalar.h"
@@ -37,7 +39,7 @@ constexpr double kMilliradian = 1e-3;
 constexpr double kMaxBlur = 0.5;
 
 /// End of the search for a narrower source: a source of a kilometre becomes one of a micron.
-constexpr double kLeastShare = 1e-9;
+constexpr double kMinShare = 1e-9;
 
 std::string angle_text(double mrad) { return "--source-angle " + number_text(mrad); }
 std::string size_text(double mm) { return "--source-size " + number_text(mm) + "mm"; }
@@ -72,12 +74,9 @@ bool lights_surface(const OpticalSetup& setup, double thickness) {
   const Eigen::Vector3d n = middle_normal(setup, middle);
   for (const SourcePoint& point : source_points({setup.extent.width, {}}, 16)) {
     const OpticalSetup one = lit_from(setup, 1.1 * point.at);
-    const bool lens = one.mode == LightMode::kRefract;
-    if (one.point &&
-        !(lens ? one.point->position.z() < 0.0 : one.point->position.z() > thickness)) {
+    const bool above = traits(one.body).lit_from_above;
+    if (!std::visit([&](const auto& l) { return l.comes_from(above, thickness); }, one.lamp))
       return false;
-    }
-    if (!one.point && !(lens ? one.light.z() > 0.0 : one.light.z() < 0.0)) return false;
     if (!LightPath(one).transmits(middle, n)) return false;
   }
   return true;
@@ -124,7 +123,7 @@ void require_source_extent(const DesignOptions& options, const OpticalSetup& set
   do {
     share *= 0.9;
     narrower.extent.width = share * setup.extent.width;
-  } while (share > kLeastShare && !allows(narrower, options.thickness));
+  } while (share > kMinShare && !allows(narrower, options.thickness));
   refuse(width_text(options.light),
          "the light of each point of the lens must cover at most half of the picture; " +
              narrower_text(options.light, share) + " would do");
@@ -137,8 +136,8 @@ void require_source_extent(const DesignOptions& options, const OpticalSetup& set
 constexpr double kStartRise = 2.0;
 
 /// Limits of the number of cells each way on which a height map is checked.
-constexpr int kFewestCells = 16;
-constexpr int kMostCells = 128;
+constexpr int kMinCells = 16;
+constexpr int kMaxCells = 128;
 
 bool works_at(const OpticalSetup& setup, const LightPath& light, const Eigen::Vector3d& p) {
   const Eigen::Vector2d slope = light.gradient_for(p, light.land_from_start(p));
@@ -192,7 +191,7 @@ void require_height_map(const OpticalSetup& setup, double thickness, const std::
            "--thickness would do");
   }
   const HeightGrid& grid = spline.grid();
-  const int cells = std::clamp(std::max(grid.columns, grid.rows) - 1, kFewestCells, kMostCells);
+  const int cells = std::clamp(std::max(grid.columns, grid.rows) - 1, kMinCells, kMaxCells);
   if (fault == FrontFault::kUnlit || !start_works(setup, thickness, depth, cells)) {
     refuse(given,
            "is too steep: light passes a part of it by, or is reflected totally behind it; "
@@ -211,17 +210,17 @@ constexpr double kUsualIncidence = 30.0;
 
 /// Minimum width of the picture in lens widths: at a hundredth two thirds of a draft's light are on
 /// the picture (16² portrait), at a hundred-thousandth none.
-constexpr double kLeastMagnification = 0.01;
+constexpr double kMinMagnification = 0.01;
 
 std::string text_of(const Eigen::Vector3d& v) { return numbers_text(std::span(v.data(), 3)); }
 std::string text_of(const Eigen::Vector2d& v) { return numbers_text(std::span(v.data(), 2)); }
 
-bool is_mirror(const DesignOptions& o) { return o.light.mode == LightMode::kReflect; }
-
 /// A place for the source below the middle of a lens, or above a mirror and beside its reflected
 /// light.
 std::string usual_position(const DesignOptions& o, const Eigen::Vector2d& size) {
-  if (!is_mirror(o)) return text_of(Eigen::Vector3d(size.x() / 2, size.y() / 2, -kUsualDistance));
+  if (!traits(o.light.body).lit_from_above) {
+    return text_of(Eigen::Vector3d(size.x() / 2, size.y() / 2, -kUsualDistance));
+  }
   const double height = std::round(0.5 * o.focal_length);
   return text_of(Eigen::Vector3d(-std::round(height * std::tan(kUsualIncidence * kDegree)),
                                  size.y() / 2, height));
@@ -239,25 +238,28 @@ void require_point(const DesignOptions& o, const Eigen::Vector2d& size) {
     refuse(given, "must be at most " + number_text(kMaxFocalLength) + " mm away; " + usual);
   }
   const double z = o.light.source_position->z();
-  if (!is_mirror(o) && !(z <= -kMinThickness)) {
+  const bool above = traits(o.light.body).lit_from_above;
+  if (!above && !(z <= -kMinThickness)) {
     refuse(given,
            "z must be below 0, where the lens begins and beyond which the screen stands; " + usual);
   }
-  if (is_mirror(o) && !(z > o.thickness)) {
-    refuse(given,
-           "z must be above the mirror's surface, " + number_text(o.thickness) + " mm; " + usual);
+  if (above && !(z > o.thickness)) {
+    refuse(given, std::string("z must be above the ") + traits(o.light.body).name + "'s surface, " +
+                      number_text(o.thickness) + " mm; " + usual);
   }
-  if (is_mirror(o) && o.light.incidence != 0.0) {
+  if (above && o.light.incidence != 0.0) {
     refuse("--incidence " + number_text(o.light.incidence),
            "is of parallel light; leave it out with --source point");
   }
 }
 
 void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
-  if (is_mirror(o) && o.light.fresnel) {
-    refuse("--fresnel", "is of a lens; leave it out with --mode reflect");
+  const std::string mode = std::string("--mode ") + traits(o.light.body).mode;
+  const bool above = traits(o.light.body).lit_from_above;
+  if (!traits(o.light.body).transmits && o.light.fresnel) {
+    refuse("--fresnel", "is of a lens; leave it out with " + mode);
   }
-  if (!is_mirror(o) && o.light.incidence != 0.0) {
+  if (!above && o.light.incidence != 0.0) {
     refuse("--incidence " + number_text(o.light.incidence), "needs --mode reflect, or must be 0");
   }
   if (o.light.source == SourceKind::kPoint) return require_point(o, size);
@@ -267,10 +269,9 @@ void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
   if (o.light.emission != Emission::kIsotropic) {
     refuse("--emission lambertian", "needs --source point");
   }
-  if (is_mirror(o) && !(o.light.incidence > 0.0)) {
-    refuse("--mode reflect",
-           "needs light from the side, or the screen is in its way; --incidence " +
-               number_text(kUsualIncidence) + " would do");
+  if (above && !(o.light.incidence > 0.0)) {
+    refuse(mode, "needs light from the side, or the screen is in its way; --incidence " +
+                     number_text(kUsualIncidence) + " would do");
   }
 }
 
@@ -333,7 +334,10 @@ void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
   if (!map && !o.light.front_radius) return;
   const std::string given =
       map ? "--front " + o.light.front_file : front_text(*o.light.front_radius);
-  if (is_mirror(o)) refuse(given, "is of a lens; --front flat would do with --mode reflect");
+  if (!traits(o.light.body).transmits) {
+    refuse(given, std::string("is of a lens; --front flat would do with --mode ") +
+                      traits(o.light.body).mode);
+  }
   if (!map) return require_sphere(o, pixels, *o.light.front_radius);
   LF_CHECK(o.light.front_heights != nullptr, given);
   const OpticalSetup setup = optical_setup(o, pixels);
@@ -371,7 +375,7 @@ void require_picture(const DesignOptions& o) {
     refuse("--image-offset " + text_of(offset),
            "must be at most " + number_text(kMaxImageWidth) + " mm; 0,0 would do");
   }
-  const double least = kLeastMagnification * o.width;
+  const double least = kMinMagnification * o.width;
   if (o.light.image_width > 0.0 && o.light.image_width < least) {
     refuse(
         "--image-width " + number_text(o.light.image_width),
@@ -386,9 +390,10 @@ void require_spectrum(const DesignOptions& o) {
     refuse("--abbe " + number_text(spectrum.abbe),
            "needs --wavelengths; --wavelengths 450,550,650 would do");
   }
-  if (!spectrum.none() && is_mirror(o)) {
+  if (!spectrum.none() && !traits(o.light.body).transmits) {
     refuse("--wavelengths " + spectrum_text(spectrum),
-           "a mirror bends light of all colours alike; leave it out");
+           std::string("a ") + traits(o.light.body).name +
+               " bends light of all colours alike; leave it out");
   }
 }
 
@@ -415,6 +420,11 @@ void require_reach(const DesignOptions& o, const OpticalSetup& setup) {
          "no surface bends the light so far; 0,0 would do");
 }
 
+/// Place of a lamp on the screen's side of the part; none if there is none.
+std::optional<Eigen::Vector3d> lamp_above(const OpticalSetup& setup) {
+  return traits(setup.body).lit_from_above ? lamp_place(setup.lamp) : std::nullopt;
+}
+
 /// Values that must be above 0: heights of the picture's corners over the surface, and distances of
 /// the lens's corners from the screen.
 std::vector<double> clearances(const OpticalSetup& setup, double thickness) {
@@ -429,9 +439,7 @@ std::vector<double> clearances(const OpticalSetup& setup, double thickness) {
       all.push_back(light.clearance({x * setup.lens_size.x(), y * setup.lens_size.y(), thickness}));
     }
   }
-  if (setup.point && setup.mode == LightMode::kReflect) {
-    all.push_back(light.clearance(setup.point->position));
-  }
+  if (const auto place = lamp_above(setup)) all.push_back(light.clearance(*place));
   return all;
 }
 
@@ -454,7 +462,7 @@ void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
   const std::string what = tilted ? "--screen-tilt " + text_of(o.light.screen_tilt)
                                   : "--focal " + number_text(o.focal_length);
   refuse(what, std::string("the screen must stand wholly beyond the surface") +
-                   (setup.point && is_mirror(o) ? " and the source" : "") + "; --focal " +
+                   (lamp_above(setup) ? " and the source" : "") + "; --focal " +
                    number_text(std::ceil(1.1 * needed)) + "mm would do");
 }
 
@@ -463,7 +471,8 @@ void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
 bool screen_shades(const OpticalSetup& setup, const Eigen::Vector3d& p, const Eigen::Vector3d& a) {
   const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
   const double back = normal.dot(setup.screen_centre() - p) / normal.dot(-a);
-  const double reach = setup.point ? (p - setup.point->position).norm() : kInfinity;
+  const auto place = lamp_place(setup.lamp);
+  const double reach = place ? (p - *place).norm() : kInfinity;
   if (!(back > 0.0 && back < reach)) return false;
   const Eigen::Vector3d l = p - back * a - setup.screen_centre();
   return std::abs(setup.screen_x.dot(l)) < 0.5 * setup.image_size.x() &&
@@ -509,7 +518,7 @@ std::string free_light(const DesignOptions& o, const Eigen::Vector2i& pixels) {
 
 void require_unshaded(const DesignOptions& o, const Eigen::Vector2i& pixels,
                       const OpticalSetup& setup) {
-  if (!is_mirror(o) || !is_shaded(setup, o.thickness)) return;
+  if (!traits(o.light.body).lit_from_above || !is_shaded(setup, o.thickness)) return;
   const std::string given = o.light.source == SourceKind::kPoint
                                 ? "--source-position " + text_of(*o.light.source_position)
                                 : "--incidence " + number_text(o.light.incidence);
@@ -549,7 +558,7 @@ std::shared_ptr<const HeightSpline> front_from(const std::string& file, const Ru
 
 OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
   OpticalSetup setup;
-  setup.mode = options.light.mode;
+  setup.body = options.light.body;
   setup.ior = options.ior;
   setup.fresnel = options.light.fresnel;
   setup.spectrum = options.light.spectrum;
@@ -568,10 +577,10 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
     setup.front = HeightFront{options.light.front_heights, setup.lens_size};
   }
   if (options.light.source == SourceKind::kPoint) {
-    setup.point = PointSource{options.light.source_position.value(), options.light.emission};
-  } else if (is_mirror(options)) {
-    setup.light = {std::sin(options.light.incidence * kDegree), 0.0,
-                   -std::cos(options.light.incidence * kDegree)};
+    setup.lamp = PointSource{options.light.source_position.value(), options.light.emission};
+  } else if (traits(setup.body).lit_from_above) {
+    const double angle = options.light.incidence * kDegree;
+    setup.lamp = ParallelLight{{std::sin(angle), 0.0, -std::cos(angle)}};
   }
   const Eigen::Vector2d chief =
       (options.focal_length - options.thickness) * LightPath(setup).chief_slope(options.thickness);

@@ -10,6 +10,7 @@
 #include "core/text/number_list.h"
 #include "core/text/number_text.h"
 #include "core/text/units.h"
+#include "core/text/words.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"
 
@@ -130,16 +131,18 @@ void describe(Description& d, DesignOptions& o) {
 }
 
 void describe(Description& d, LightOptions& o) {
-  d.word("--mode", o.mode, {{"refract", LightMode::kRefract}, {"reflect", LightMode::kReflect}},
-         "a lens, or a mirror that is lit from above");
+  std::string help;
+  for (const auto& [mode, body] : named_bodies())
+    help = with_word(help, traits(body).help, ", or ");
+  Field& mode = d.word("--mode", o.body, named_bodies(), help);
+  mode.stored = [&o] { return FieldValue(static_cast<int>(o.body.index())); };
   d.number("--incidence", o.incidence, Limits::between(0, kMaxTilt), "degrees",
            "angle between parallel light and a mirror's z axis; it comes from the left, seen from "
            "above");
   d.word("--source", o.source, {{"parallel", SourceKind::kParallel}, {"point", SourceKind::kPoint}},
          "parallel light, or light from a point");
   describe_source_position(d, o.source_position);
-  d.word("--emission", o.emission,
-         {{"isotropic", Emission::kIsotropic}, {"lambertian", Emission::kLambertian}},
+  d.word("--emission", o.emission, named_emissions(),
          "intensity of a point source: the same in all directions, or that of a flat LED which "
          "points to the middle of the lens");
   d.number("--source-angle", o.source_angle, Limits::zero_or(kMinSourceWidth, kMaxSourceAngle),

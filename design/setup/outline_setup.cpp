@@ -202,10 +202,10 @@ void require_outline(const std::optional<Outline>& outline, const Eigen::Vector2
   const Outline inside = fitted(*outline, lens_size);
   if (const auto fault = polygon_fault(inside.points)) refuse(*fault + kCircleWouldDo);
   const double share = polygon_area(inside.points) / lens_size.prod();
-  if (!(share >= kLeastOutlineShare)) {
+  if (!(share >= kMinOutlineShare)) {
     refuse("leaves " + number_text(100.0 * share, 2) + " % of the lens's rectangle of " +
            number_text(lens_size.x()) + " x " + number_text(lens_size.y()) +
-           " mm to the light: must be at least " + number_text(100.0 * kLeastOutlineShare) + " %" +
+           " mm to the light: must be at least " + number_text(100.0 * kMinOutlineShare) + " %" +
            kCircleWouldDo);
   }
 }

@@ -242,7 +242,7 @@ namespace {
 /// second share of its depth without weights if that is more. Both are far above rounding, so sites
 /// that hide each other in turn come to an end.
 constexpr double kDepthKept = 0.5;
-constexpr double kLeastDepth = 1e-6;
+constexpr double kMinDepth = 1e-6;
 
 /// Depth of a site's height below the plane through those of the triangle around it.
 class Depth {
@@ -295,7 +295,7 @@ bool RegularTriangulation::reweight(const Eigen::Matrix2Xd& sites, const Eigen::
       const auto [site, around] = hidden_by(test, f, k);
       const Depth depth(sites, site, around);
       const double wanted =
-          std::max(kDepthKept * depth.under(before), kLeastDepth * depth.without_weights());
+          std::max(kDepthKept * depth.under(before), kMinDepth * depth.without_weights());
       const double raise = wanted - depth.under(weights);
       if (!std::isfinite(raise)) return false;  // The triangle is too thin.
       weights[site] += raise;

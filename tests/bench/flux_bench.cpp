@@ -89,10 +89,10 @@ enum Kind : std::uint8_t { kAlongZ, kPoint, kMirror, kPointOnMirror, kCurvedFron
 
 OpticalSetup setup_of(std::int64_t kind, int pixels) {
   OpticalSetup setup = paper_setup(pixels);
-  if (kind == kMirror || kind == kPointOnMirror) setup.mode = LightMode::kReflect;
-  if (kind == kMirror) setup.light = {0.5, 0.0, -std::sqrt(0.75)};
-  if (kind == kPoint) setup.point = PointSource{{50.0, 50.0, -600.0}};
-  if (kind == kPointOnMirror) setup.point = PointSource{{-87.0, 50.0, 150.0}};
+  if (kind == kMirror || kind == kPointOnMirror) setup.body = MirrorBody{};
+  if (kind == kMirror) setup.lamp = ParallelLight{{0.5, 0.0, -std::sqrt(0.75)}};
+  if (kind == kPoint) setup.lamp = PointSource{{50.0, 50.0, -600.0}};
+  if (kind == kPointOnMirror) setup.lamp = PointSource{{-87.0, 50.0, 150.0}};
   if (kind == kCurvedFront) setup.front = spherical_front(500.0, setup.lens_size);
   // A picture that the light of a flat surface fills, as that of a design does.
   const LightPath light(setup);

@@ -3,6 +3,7 @@
 #include <cinttypes>
 #include <cstdio>
 #include <exception>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "bench/ray_trace.h"
@@ -61,8 +62,7 @@ void print_json(const bench::RayTraceResult& result, const Lens& lens) {
 /// @throw InputError unless parallel light goes along z through a lens to an unturned screen.
 void require_usual_light(const Lens& lens) {
   const OpticalSetup& setup = lens.setup;
-  const bool along_z = !setup.point && setup.light == Eigen::Vector3d::UnitZ();
-  if (along_z && setup.extent.none() && setup.mode == LightMode::kRefract &&
+  if (setup.lamp == Lamp() && setup.extent.none() && traits(setup.body).transmits &&
       !setup.screen_is_turned()) {
     return;
   }

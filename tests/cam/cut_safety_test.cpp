@@ -297,8 +297,8 @@ TEST(CutSafety, AMaterialOfAnotherIndexIsAMissedLimit) {
 
 TEST(CutSafety, AMirrorsMaterialAndUndersideDoNotConcernItsLight) {
   Lens mirror = small_lens();
-  mirror.setup.mode = LightMode::kReflect;
-  mirror.setup.light = {0.6, 0.0, -0.8};
+  mirror.setup.body = MirrorBody{};
+  mirror.setup.lamp = ParallelLight{{0.6, 0.0, -0.8}};
   CamOptions options = programs_only();
   options.workshop.material.ior = 1.586;
   const TempFolder folder;

@@ -270,7 +270,7 @@ TEST_F(NestJob, WhatDoesNotFitOneBlankIsRefusedInOneLine) {
   disc_.setup.front = spherical_front(100.0, disc_.setup.lens_size);
   EXPECT_THAT(refusal(), HasSubstr("disc: has a curved front"));
   disc_.setup.front.reset();
-  disc_.setup.mode = LightMode::kReflect;
+  disc_.setup.body = MirrorBody{};
   EXPECT_THAT(refusal(), HasSubstr("disc: is a mirror, bee is a lens"));
   lenses_.clear();
   EXPECT_THAT(refusal(), HasSubstr("no lens folder is named"));

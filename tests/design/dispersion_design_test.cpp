@@ -36,7 +36,7 @@ struct Kind {
   void (*apply)(OpticalSetup&);
 };
 void nothing_else(OpticalSetup& /*setup*/) {}
-void point_source(OpticalSetup& setup) { setup.point = PointSource{{15.0, 10.0, -150.0}, {}}; }
+void point_source(OpticalSetup& setup) { setup.lamp = PointSource{{15.0, 10.0, -150.0}, {}}; }
 void curved_front(OpticalSetup& setup) {
   point_source(setup);
   setup.front = spherical_front(-120.0, setup.lens_size);

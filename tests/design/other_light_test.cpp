@@ -39,7 +39,7 @@ struct KindOfLight {
 };
 
 void light_from_the_side(OpticalSetup& setup) {
-  setup.light = Eigen::Vector3d(0.25, -0.15, 1.0).normalized();
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.25, -0.15, 1.0).normalized()};
 }
 void turn_screen(OpticalSetup& setup) {
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()) *
@@ -53,16 +53,16 @@ void large_turned_screen(OpticalSetup& setup) {
   setup.image_size *= 1.3;
 }
 void point_source(OpticalSetup& setup) {
-  setup.point = PointSource{{0.5 * setup.lens_size.x() + 5.0, 0.5 * setup.lens_size.y(), -150.0},
-                            Emission::kLambertian};
+  setup.lamp = PointSource{{0.5 * setup.lens_size.x() + 5.0, 0.5 * setup.lens_size.y(), -150.0},
+                           Emission::kLambertian};
 }
 void mirror(OpticalSetup& setup) {
-  setup.mode = LightMode::kReflect;
-  setup.light = Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75));
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75))};
 }
 void lit_mirror(OpticalSetup& setup) {
-  setup.mode = LightMode::kReflect;
-  setup.point = PointSource{{-90.0, 0.5 * setup.lens_size.y(), 150.0}, Emission::kIsotropic};
+  setup.body = MirrorBody{};
+  setup.lamp = PointSource{{-90.0, 0.5 * setup.lens_size.y(), 150.0}, Emission::kIsotropic};
 }
 
 void convex_front(OpticalSetup& setup) { setup.front = spherical_front(120.0, setup.lens_size); }
@@ -241,12 +241,15 @@ struct SourceRay {
 
 SourceRay source_ray(const OpticalSetup& setup, const FrontPlace& front) {
   const Eigen::Vector3d across = front.normal / front.normal.z();
-  if (!setup.point) return {setup.light, across.dot(setup.light) / setup.light.z()};
-  const Eigen::Vector3d from = front.place - setup.point->position;
+  if (const auto* const parallel = std::get_if<ParallelLight>(&setup.lamp)) {
+    return {parallel->direction, across.dot(parallel->direction) / parallel->direction.z()};
+  }
+  const auto& lamp = std::get<PointSource>(setup.lamp);
+  const Eigen::Vector3d from = front.place - lamp.position;
   const Eigen::Vector3d way = from.normalized();
   const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
-  const bool even = setup.point->emission == Emission::kIsotropic;
-  const double intensity = even ? 1.0 : way.dot((middle - setup.point->position).normalized());
+  const bool even = lamp.emission == Emission::kIsotropic;
+  const double intensity = even ? 1.0 : way.dot((middle - lamp.position).normalized());
   return {way, intensity * std::abs(across.dot(way)) / from.squaredNorm()};
 }
 
@@ -317,7 +320,7 @@ struct TracedPicture {
 /// angles, or go straight on, meet the surface, and are refracted or reflected there.
 template <class Surface>
 TracedPicture traced(const Surface& surface, const OpticalSetup& setup, int rays) {
-  const bool lens = setup.mode == LightMode::kRefract;
+  const bool lens = traits(setup.body).transmits;
   const Eigen::Vector3d normal = setup.screen_x.cross(setup.screen_y);
   const ImagePlane plane(setup);
   TracedPicture picture;

@@ -64,8 +64,8 @@ TEST_F(ExportLens, ACallWritesTheSolidAndSaysHowGoodItIs) {
 /// The file's own surface, read as any other solid, reflects the picture that the mirror does.
 TEST_F(ExportLens, AMirrorsMeshBecomesASolidThatReflectsItsPicture) {
   OpticalSetup& setup = source_.lens.setup;
-  setup.mode = LightMode::kReflect;
-  setup.light = {0.5, 0.0, -std::sqrt(0.75)};
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{{0.5, 0.0, -std::sqrt(0.75)}};
   setup.focal_length = 30.0;
   setup.image_size = {44.0, 36.0};  // All of its light.
   setup.image_origin = {15.0 - 22.0 + 25.0 * std::tan(std::asin(0.5)), 12.0 - 18.0};

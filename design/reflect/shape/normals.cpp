@@ -18,7 +18,7 @@ namespace {
 
 /// Minimum curvature of a face per unit of its share of the area, for faces without light and
 /// anchor: a thousandth of the largest, 200.
-constexpr double kLeastCurvature = 0.2;
+constexpr double kMinCurvature = 0.2;
 
 Eigen::Map<const Eigen::Matrix3Xd> columns_of(std::span<const double> values) {
   return {values.data(), 3, static_cast<Eigen::Index>(values.size() / 3)};
@@ -45,7 +45,7 @@ FaceTerms NormalObjective::by_face(const Eigen::Matrix3Xd& normals) const {
     const Eigen::Vector3d offset = t - anchor_.reference.col(k);
     terms.value[k] += 0.5 * weight(k) * offset.squaredNorm();
     terms.gradient.col(k) = normalize_adjoint(t, 1.0, terms.gradient.col(k) + weight(k) * offset);
-    terms.curvature[k] += weight(k) + kLeastCurvature * share_[k];
+    terms.curvature[k] += weight(k) + kMinCurvature * share_[k];
   }
   return terms;
 }

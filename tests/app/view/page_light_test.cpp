@@ -32,7 +32,7 @@ struct KindOfLight {
 void along_z(OpticalSetup&) {}
 void seen_from_the_rear(OpticalSetup& setup) { setup.view = ViewSide::kRear; }
 void from_the_side(OpticalSetup& setup) {
-  setup.light = Eigen::Vector3d(0.25, -0.15, 1.0).normalized();
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.25, -0.15, 1.0).normalized()};
 }
 void turned_screen(OpticalSetup& setup) {
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()) *
@@ -42,19 +42,19 @@ void turned_screen(OpticalSetup& setup) {
   setup.screen_y = turn.col(1);
 }
 void point_source(OpticalSetup& setup) {
-  setup.point = PointSource{{0.5 * kSize.x() + 5.0, 0.5 * kSize.y(), -90.0}, Emission::kLambertian};
+  setup.lamp = PointSource{{0.5 * kSize.x() + 5.0, 0.5 * kSize.y(), -90.0}, Emission::kLambertian};
 }
 void reflecting_faces(OpticalSetup& setup) {
   point_source(setup);
   setup.fresnel = true;
 }
 void mirror(OpticalSetup& setup) {
-  setup.mode = LightMode::kReflect;
-  setup.light = Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75));
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75))};
 }
 void lit_mirror(OpticalSetup& setup) {
-  setup.mode = LightMode::kReflect;
-  setup.point = PointSource{{-90.0, 0.5 * kSize.y(), 150.0}, Emission::kIsotropic};
+  setup.body = MirrorBody{};
+  setup.lamp = PointSource{{-90.0, 0.5 * kSize.y(), 150.0}, Emission::kIsotropic};
 }
 void convex_front(OpticalSetup& setup) { setup.front = spherical_front(120.0, kSize); }
 void point_concave_front(OpticalSetup& setup) {

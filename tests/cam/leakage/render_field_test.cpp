@@ -171,7 +171,7 @@ TEST(RenderField, ASpectrumSendsTheSumOfItsColors) {
   setup.optics.spectrum = {{460.0, 550.0, 640.0}, {1.0, 2.0, 1.0}, 15.0};
   for (const bool lamp : {false, true}) {
     if (lamp) {
-      setup.optics.point = PointSource{{2.0, 2.0, -60.0}, {}};
+      setup.optics.lamp = PointSource{{2.0, 2.0, -60.0}, {}};
       setup.whole = {13.0, 14.0, 15.0};
     }
     std::vector<double> sum(400, 0.0);
@@ -328,7 +328,7 @@ TEST(LensGrid, RefusesASizeOrSpacingThatMakesNoGrid) {
 /// Light from a side on a plane: one beam, and a share of flux that depends on the slope.
 TEST(RenderField, LightFromTheSideFollowsSnellsLawTwice) {
   FieldRenderSetup setup = setup_of(0.05);
-  setup.optics.light = Eigen::Vector3d(0.08, 0.0, 1.0).normalized();
+  setup.optics.lamp = ParallelLight{Eigen::Vector3d(0.08, 0.0, 1.0).normalized()};
   const double inside = std::asin(0.08 / std::hypot(0.08, 1.0) / 1.49);
   const Eigen::Vector2d slope(0.09, 0.0);
   const double lean = std::atan(slope.x());

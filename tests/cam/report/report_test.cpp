@@ -106,7 +106,7 @@ TEST(Report, SaysWhatLimitsTheDarkOfALensAndOfAMirror) {
   EXPECT_EQ(report_json(data)["leakage"]["ghost_share"], 0.0015);
   EXPECT_THAT(report_html(data), HasSubstr("z up from the entry face"));
   EXPECT_THAT(report_html(data), Not(HasSubstr("coat the polished surface")));
-  data.mirror = true;
+  data.body = MirrorBody{};
   data.ghost = 0.0;
   EXPECT_THAT(report_html(data), HasSubstr("Worst places on the mirror"));
   EXPECT_THAT(report_html(data), HasSubstr("z up from the underside"));

@@ -83,7 +83,7 @@ Eigen::Vector2d caught(const OpticalSetup& optics, double farther, const Eigen::
 
 TEST(PartLight, OfAPointLandsWhereARayThroughBothTurnedFacesDoes) {
   OpticalSetup optics = with_tilted_screen(setup());
-  optics.point = PointSource{{8.0, 9.0, -200.0}, Emission::kIsotropic};
+  optics.lamp = PointSource{{8.0, 9.0, -200.0}, Emission::kIsotropic};
   const PartError error = some_errors();
   const PartLight light(optics, error);
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(error.tilt.y(), Eigen::Vector3d::UnitY()) *
@@ -92,7 +92,7 @@ TEST(PartLight, OfAPointLandsWhereARayThroughBothTurnedFacesDoes) {
   const double ior = optics.ior + error.index;
   const Eigen::Vector3d centre(10.0, 8.0, 0.0);
   for (const Eigen::Vector2d& aim : {Eigen::Vector2d(3.0, 4.0), Eigen::Vector2d(18.0, 1.0)}) {
-    const Eigen::Vector3d source = optics.point->position;
+    const Eigen::Vector3d source = lamp_place(optics.lamp).value();
     const Eigen::Vector3d front = centre + turn * (Eigen::Vector3d(aim.x(), aim.y(), 0.0) - centre);
     const Eigen::Vector3d inside = refract((front - source).normalized(), turn.col(2), 1.0 / ior);
     const Eigen::Vector3d out = front + 5.0 * inside;
@@ -107,8 +107,9 @@ TEST(PartLight, OfAPointLandsWhereARayThroughBothTurnedFacesDoes) {
 
 TEST(PartLight, OfAMirrorLandsWhereARayFromTheTurnedMirrorDoes) {
   OpticalSetup optics = with_tilted_screen(setup());
-  optics.mode = LightMode::kReflect;
-  optics.light = {0.5, 0.0, -std::sqrt(0.75)};
+  optics.body = MirrorBody{};
+  const Eigen::Vector3d before(0.5, 0.0, -std::sqrt(0.75));
+  optics.lamp = ParallelLight{before};
   optics.image_origin.x() = 30.0;
   const PartError error = some_errors();
   const PartLight light(optics, error);
@@ -119,7 +120,7 @@ TEST(PartLight, OfAMirrorLandsWhereARayFromTheTurnedMirrorDoes) {
   const Eigen::Vector3d place(3.0, 4.0, 5.0);
   const Eigen::Vector2d slope(0.05, -0.02);
   const Eigen::Vector3d n = turn * Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
-  const Eigen::Vector3d way = optics.light - 2.0 * optics.light.dot(n) * n;
+  const Eigen::Vector3d way = before - 2.0 * before.dot(n) * n;
   const Eigen::Vector3d from = centre + turn * (1.0 + error.expansion) * (place - centre);
   const Eigen::Vector2d landed = light.land(light.grown(place.head<2>(), place.z()), slope);
   EXPECT_NEAR((landed - caught(optics, error.distance, from, way)).norm(), 0.0, 1e-9);
@@ -129,7 +130,7 @@ TEST(PartLight, OfAMirrorLandsWhereARayFromTheTurnedMirrorDoes) {
 /// inside the same rim.
 TEST(PartLight, TakesInWhatGoesThroughItsRim) {
   OpticalSetup optics = setup();
-  optics.point = PointSource{{8.0, 9.0, -100.0}, Emission::kIsotropic};
+  optics.lamp = PointSource{{8.0, 9.0, -100.0}, Emission::kIsotropic};
   const PartLight light(optics, some_errors());
   const auto nodes_of = [](int cells) {
     PartNodes nodes{static_cast<std::size_t>(cells) + 1, {}};
@@ -151,8 +152,8 @@ TEST(PartLight, TakesInWhatGoesThroughItsRim) {
 /// direction φ aside lands φ L aside, and one φ along the plane of incidence φ L / cos 30°.
 TEST(PartLight, ASourceOfAMirrorLightsAnEllipse) {
   OpticalSetup optics = setup();
-  optics.mode = LightMode::kReflect;
-  optics.light = {0.5, 0.0, -std::sqrt(0.75)};
+  optics.body = MirrorBody{};
+  optics.lamp = ParallelLight{{0.5, 0.0, -std::sqrt(0.75)}};
   const double cosine = std::sqrt(0.75);
   optics.image_origin.x() = 55.0 * 0.5 / cosine;
   const Eigen::Vector2d radii = PartLight(optics, {}).source_radii(0.004, 5.0);

@@ -204,8 +204,8 @@ TEST_F(PartModelTest, APartWithoutErrorsIsThatOfTheChain) {
 /// Other kinds of light that a slope moves about as far over the picture.
 OpticalSetup mirror_setup() {
   OpticalSetup optics = setup();
-  optics.mode = LightMode::kReflect;
-  optics.light = {0.5, 0.0, -std::sqrt(0.75)};
+  optics.body = MirrorBody{};
+  optics.lamp = ParallelLight{{0.5, 0.0, -std::sqrt(0.75)}};
   optics.focal_length = 6.7;
   optics.image_origin.x() += (6.7 - 3.0) * std::tan(std::asin(0.5));
   return optics;
@@ -213,7 +213,7 @@ OpticalSetup mirror_setup() {
 
 OpticalSetup point_setup() {
   OpticalSetup optics = setup();
-  optics.point = PointSource{{3.0, 2.2, -60.0}, Emission::kIsotropic};
+  optics.lamp = PointSource{{3.0, 2.2, -60.0}, Emission::kIsotropic};
   optics.image_size = {5.0, 5.0};
   optics.image_origin = {-0.12, 0.07};
   return optics;
@@ -230,7 +230,8 @@ OpticalSetup tilted_setup() {
 TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
   const SurfaceMesh mesh = testing::grid_mesh(51, 51, kSide, kSide, relief);
   for (const OpticalSetup& optics : {mirror_setup(), point_setup(), tilted_setup()}) {
-    SCOPED_TRACE(optics.point ? "point" : (optics.screen_is_turned() ? "tilted" : "mirror"));
+    SCOPED_TRACE(lamp_place(optics.lamp) ? "point"
+                                         : (optics.screen_is_turned() ? "tilted" : "mirror"));
     const auto render = [&](const SurfaceField& field, const OpticalSetup& by) {
       FieldRenderSetup rendering = fine(by);
       rendering.whole = {intake_of(mesh, LightPath(by))};
@@ -347,8 +348,8 @@ TEST_F(PartModelTest, ASourceBlursThePictureAsManyDirectionsDo) {
       const double angle = 0.5 * error.source * std::sqrt((ring + 0.5) / rings);
       const double heading = kTwoPi * (k + 0.5 * ring) / places;
       OpticalSetup optics = setup();
-      optics.light = Eigen::Vector3d(angle * std::cos(heading), angle * std::sin(heading), 1.0);
-      optics.light.normalize();
+      const Eigen::Vector3d way(angle * std::cos(heading), angle * std::sin(heading), 1.0);
+      optics.lamp = ParallelLight{way.normalized()};
       const PolishedField part(*milled_, meant_->field(),
                                {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
                                {kSigma, 0.0, 1.0});

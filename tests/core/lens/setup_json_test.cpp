@@ -4,7 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstddef>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -17,6 +21,7 @@ namespace lensforge {
 namespace {
 
 using nlohmann::json;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using testing::message_of;
 
@@ -48,17 +53,66 @@ TEST(SetupJson, EveryLightAndScreenComesBackToTheBit) {
   setup.image_origin = {-12.3, 0.1};
   EXPECT_EQ(written_and_read(setup), setup);
   setup.view = ViewSide::kRear;
-  setup.point = PointSource{{1.0, 2.0, -30.1}, Emission::kLambertian};
+  setup.lamp = PointSource{{1.0, 2.0, -30.1}, Emission::kLambertian};
   EXPECT_EQ(written_and_read(setup), setup);
   setup.fresnel = true;
   EXPECT_EQ(written_and_read(setup), setup);
   setup.fresnel = false;
-  setup.mode = LightMode::kReflect;
-  setup.point->position.z() = 30.1;
+  setup.body = MirrorBody{};
+  setup.lamp = PointSource{{1.0, 2.0, 30.1}, Emission::kLambertian};
   EXPECT_EQ(written_and_read(setup), setup);
-  setup.point.reset();
-  setup.light = Eigen::Vector3d(0.6, 0.0, -0.8);
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.6, 0.0, -0.8)};
   EXPECT_EQ(written_and_read(setup), setup);
+}
+
+/// A lamp of every kind.
+std::array<Lamp, std::variant_size_v<Lamp>> every_lamp(bool above) {
+  const double side = above ? 1.0 : -1.0;
+  return {ParallelLight{{0.6, 0.0, -0.8 * side}},
+          PointSource{{1.0, 2.0, 30.1 * side}, Emission::kLambertian}};
+}
+
+TEST(SetupJson, EveryLampBeforeEveryPartComesBackAndHasItsOwnWords) {
+  std::set<std::string> words;
+  for (const auto& [mode, body] : named_bodies()) {
+    const bool above = traits(body).lit_from_above;
+    for (std::size_t kind = 0; kind < std::variant_size_v<Lamp>; ++kind) {
+      SCOPED_TRACE(mode + std::to_string(kind));
+      OpticalSetup setup;
+      setup.body = body;
+      setup.lamp = every_lamp(above)[kind];
+      setup.extent.width = 0.25;
+      ASSERT_EQ(setup.lamp.index(), kind);
+      EXPECT_EQ(written_and_read(setup), setup);
+      EXPECT_EQ(setup_json(setup)["mode"], mode);
+      words.insert(traits(body).name + lamp_words(setup));
+      setup.lamp = every_lamp(!above)[kind];
+      EXPECT_THAT(message_of<InputError>([&] { validate(setup); }), HasSubstr(": it must be "));
+    }
+  }
+  EXPECT_EQ(words.size(), std::variant_size_v<Lamp> * std::variant_size_v<Body>);
+}
+
+TEST(SetupJson, OnlyAPartThatTransmitsLightHasAFrontColoursAndLosses) {
+  for (const auto& [mode, body] : named_bodies()) {
+    OpticalSetup bare;
+    bare.body = body;
+    bare.lamp = every_lamp(traits(body).lit_from_above)[0];
+    OpticalSetup curved = bare;
+    curved.front = SphericalFront{150.0, {50.0, 50.0, 0.0}};
+    OpticalSetup coloured = bare;
+    coloured.spectrum.wavelengths = {450.0, 650.0};
+    OpticalSetup losing = bare;
+    losing.fresnel = true;
+    for (const OpticalSetup& setup : {curved, coloured, losing}) {
+      if (traits(body).transmits) {
+        EXPECT_EQ(written_and_read(setup), setup) << mode;
+      } else {
+        EXPECT_THAT(message_of<InputError>([&] { validate(setup); }),
+                    EndsWith(std::string(": it must be left out of a ") + traits(body).name));
+      }
+    }
+  }
 }
 
 TEST(SetupJson, AFrontComesBackToTheBit) {
@@ -105,7 +159,7 @@ TEST(SetupJson, AnExtendedSourceComesBackWithItsShape) {
   setup.extent.width = 0.002;
   EXPECT_EQ(setup_json(setup)["source"]["angle_mrad"], 2.0);
   EXPECT_EQ(written_and_read(setup), setup);
-  setup.point = PointSource{{1.0, 2.0, -30.1}, Emission::kIsotropic};
+  setup.lamp = PointSource{{1.0, 2.0, -30.1}, Emission::kIsotropic};
   setup.extent = {3.5, {3, 2, {0.0, 1.0, 0.25, 0.5, 0.0, 0.0}}};
   EXPECT_EQ(setup_json(setup)["source"]["size_mm"], 3.5);
   EXPECT_EQ(written_and_read(setup), setup);

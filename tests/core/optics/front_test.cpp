@@ -131,8 +131,8 @@ TEST(HeightFront, LightThroughAMapOfASphereIsThatThroughTheSphere) {
   for (const bool point : {false, true}) {
     OpticalSetup setup;
     setup.lens_size = kSize;
-    setup.light = Eigen::Vector3d(0.1, -0.05, 1.0).normalized();
-    if (point) setup.point = PointSource{{12.0, 10.0, -90.0}, Emission::kLambertian};
+    setup.lamp = ParallelLight{Eigen::Vector3d(0.1, -0.05, 1.0).normalized()};
+    if (point) setup.lamp = PointSource{{12.0, 10.0, -90.0}, Emission::kLambertian};
     const SphericalFront sphere = spherical_front(60.0, kSize);
     setup.front = sphere;
     const LightPath exact(setup);
@@ -206,7 +206,7 @@ TEST(HeightFront, ItsFaultsAreFound) {
   EXPECT_FALSE(fault(0.1, 6.0).has_value());
   EXPECT_EQ(fault(0.1, 9.0), FrontFault::kFolds);
   EXPECT_EQ(fault(0.2, 6.0), FrontFault::kFolds);
-  setup.light = Eigen::Vector3d(1.0, 0.0, 0.1).normalized();  // Slopes are up to 0.2.
+  setup.lamp = ParallelLight{Eigen::Vector3d(1.0, 0.0, 0.1).normalized()};  // Slopes are up to 0.2.
   EXPECT_EQ(fault(0.1, 6.0), FrontFault::kUnlit);
 }
 

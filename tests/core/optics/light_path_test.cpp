@@ -25,7 +25,7 @@ class EveryLight : public ::testing::TestWithParam<KindOfLight> {
  protected:
   const OpticalSetup setup_ = GetParam().setup;
   const LightPath light_{setup_};
-  const bool mirror_ = setup_.mode == LightMode::kReflect;
+  const bool mirror_ = traits(setup_.body).reflects;
 
   [[nodiscard]] Eigen::Vector3d incident(const Eigen::Vector3d& p) const {
     return reference_incident(setup_, p);
@@ -259,7 +259,8 @@ double area_of_front(const OpticalSetup& setup) {
         side % 2 == 0 ? Eigen::Vector2d(share, side == 0 ? 0.0 : 1.0).cwiseProduct(size)
                       : Eigen::Vector2d(side == 1 ? 1.0 : 0.0, share).cwiseProduct(size);
     const double z = setup.front ? FrontSurface(*setup.front).height(place) : 0.0;
-    return place - z / setup.light.z() * setup.light.head<2>();
+    const Eigen::Vector3d& way = std::get<ParallelLight>(setup.lamp).direction;
+    return place - z / way.z() * way.head<2>();
   };
   double area = 0.0;
   for (int i = 0; i < 4 * kParts; ++i) {
@@ -271,7 +272,8 @@ double area_of_front(const OpticalSetup& setup) {
 }
 
 TEST_P(EveryLight, FluxOfParallelLightIsTheAreaThroughWhichItEnters) {
-  if (setup_.point) return;
+  const auto* const lamp = std::get_if<ParallelLight>(&setup_.lamp);
+  if (lamp == nullptr) return;
   const double whole = area_of_front(setup_);
   Random random(5);
   for (int i = 0; i < 100; ++i) {
@@ -279,7 +281,7 @@ TEST_P(EveryLight, FluxOfParallelLightIsTheAreaThroughWhichItEnters) {
     // Where the ray before a curved front passes z = 0.
     const auto entry = [&](const Eigen::Vector3d& p) -> Eigen::Vector2d {
       const Eigen::Vector3d e = entry_of(setup_, p);
-      return (e - e.z() / setup_.light.z() * setup_.light).head<2>();
+      return (e - e.z() / lamp->direction.z() * lamp->direction).head<2>();
     };
     const Eigen::Vector2d side = entry(t.v1) - entry(t.v0);
     const Eigen::Vector2d other = entry(t.v2) - entry(t.v0);
@@ -290,14 +292,14 @@ TEST_P(EveryLight, FluxOfParallelLightIsTheAreaThroughWhichItEnters) {
 }
 
 TEST_P(EveryLight, FluxOfAPointSourceIsItsIntensityOverTheSolidAngle) {
-  if (!setup_.point) return;
-  const Eigen::Vector3d& from = setup_.point->position;
+  const auto* const lamp = std::get_if<PointSource>(&setup_.lamp);
+  if (lamp == nullptr) return;
+  const Eigen::Vector3d& from = lamp->position;
   const Eigen::Vector3d axis = (Eigen::Vector3d(50.0, 40.0, 0.0) - from).normalized();
   // The middle of many small pieces, each as cos / distance², against the lens's middle.
   const auto intensity = [&](const Eigen::Vector3d& way) {
     const double even = 1.0 / way.squaredNorm();
-    return setup_.point->emission == Emission::kIsotropic ? even
-                                                          : even * axis.dot(way.normalized());
+    return lamp->emission == Emission::kIsotropic ? even : even * axis.dot(way.normalized());
   };
   const Eigen::Vector3d middle = Eigen::Vector3d(50.0, 40.0, 0.0) - from;
   const double unit = std::abs(middle.normalized().z()) / middle.squaredNorm();
@@ -369,12 +371,10 @@ TEST_P(EveryLight, ReflectingFacesTakeWhatFresnelsFormulasSay) {
     if (!light_.transmits(middle, n)) continue;
     const Eigen::Vector3d a = incident(middle);
     double share = transmitted_by_angles(a, testing::refract_by_angles(a, n, setup_.ior), n);
-    if (setup_.point || setup_.front) {
+    if (lamp_place(setup_.lamp) || setup_.front) {
       const LightSource source(setup_);
       const Eigen::Vector3d entry = source.entry(middle);
-      const Eigen::Vector3d before =
-          setup_.point ? Eigen::Vector3d((entry - setup_.point->position).normalized())
-                       : setup_.light;
+      const Eigen::Vector3d before = way_to(setup_, entry);
       const Eigen::Vector3d front =
           setup_.front ? front_normal(*setup_.front, entry) : Eigen::Vector3d::UnitZ();
       share *= transmitted_by_angles(before, a, front);
@@ -406,8 +406,9 @@ TEST_P(EveryLight, ASurfaceOfTheWantedGradientSendsItsLightThere) {
 }
 
 TEST_P(EveryLight, AFlatLensLetsLightGoOnInItsDirection) {
-  if (setup_.point || setup_.front) return;
-  Eigen::Vector3d way = setup_.light;
+  const auto* const lamp = std::get_if<ParallelLight>(&setup_.lamp);
+  if (lamp == nullptr || setup_.front) return;
+  Eigen::Vector3d way = lamp->direction;
   if (mirror_) way.z() = -way.z();
   const Eigen::Vector3d to_centre = setup_.screen_centre() - kPlace;
   const Eigen::Vector3d normal = setup_.screen_x.cross(setup_.screen_y);
@@ -428,7 +429,7 @@ TEST(LightPath, AStartBehindACurvedFrontMakesTheLightParallel) {
 
 TEST(LightPath, NoLightComesThroughAFrontThatIsTurnedAway) {
   OpticalSetup setup = point_front_setup(130.0, Emission::kIsotropic);
-  setup.point->position = {55.0, 38.0, -21.0};
+  setup.lamp = PointSource{{55.0, 38.0, -21.0}, Emission::kIsotropic};
   const LightPath light(setup);
   const Eigen::Vector3d n = Eigen::Vector3d::UnitZ();
   EXPECT_TRUE(light.transmits(Eigen::Vector3d(56.0, 38.0, 5.0), n));
@@ -463,7 +464,7 @@ TEST_P(EveryLight, ReachIsHowFarASlopeMovesTheLight) {
 TEST(LightPath, FormulasForLightAlongZAreTheGeneralOnes) {
   OpticalSetup setup = shifted_setup();
   const LightPath along_z(setup);
-  setup.light = Eigen::Vector3d(1e-15, 0.0, 1.0);  // One in length, but not +z.
+  setup.lamp = ParallelLight{Eigen::Vector3d(1e-15, 0.0, 1.0)};  // One in length, but not +z.
   const LightPath general(setup);
   Random random(8);
   for (int i = 0; i < 200; ++i) {

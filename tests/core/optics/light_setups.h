@@ -27,7 +27,7 @@ inline OpticalSetup shifted_setup() {
 
 inline OpticalSetup oblique_setup() {
   OpticalSetup setup = shifted_setup();
-  setup.light = Eigen::Vector3d(0.3, -0.2, 1.0).normalized();
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.3, -0.2, 1.0).normalized()};
   return setup;
 }
 
@@ -43,21 +43,20 @@ inline OpticalSetup turned_setup() {
 
 inline OpticalSetup point_setup(Emission emission) {
   OpticalSetup setup = turned_setup();
-  setup.point = PointSource{{70.0, 20.0, -120.0}, emission};
+  setup.lamp = PointSource{{70.0, 20.0, -120.0}, emission};
   return setup;
 }
 
 inline OpticalSetup mirror_setup() {
   OpticalSetup setup = turned_setup();
-  setup.mode = LightMode::kReflect;
-  setup.light = Eigen::Vector3d(0.5, 0.1, -1.0).normalized();
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.5, 0.1, -1.0).normalized()};
   return setup;
 }
 
 inline OpticalSetup lit_mirror_setup() {
   OpticalSetup setup = mirror_setup();
-  setup.light = Eigen::Vector3d::UnitZ();
-  setup.point = PointSource{{-60.0, 30.0, 150.0}, Emission::kLambertian};
+  setup.lamp = PointSource{{-60.0, 30.0, 150.0}, Emission::kLambertian};
   return setup;
 }
 
@@ -125,6 +124,12 @@ inline Eigen::Vector3d front_point(const Front& any, const Eigen::Vector2d& xy) 
   return {xy.x(), xy.y(), front.apex.z() + front.radius - (front.radius > 0.0 ? depth : -depth)};
 }
 
+/// Unit direction of the light before a lens at a point.
+inline Eigen::Vector3d way_to(const OpticalSetup& setup, const Eigen::Vector3d& p) {
+  if (const auto* const lamp = std::get_if<ParallelLight>(&setup.lamp)) return lamp->direction;
+  return (p - std::get<PointSource>(setup.lamp).position).normalized();
+}
+
 /// The ray that comes to a point through a curved front: its place on the front is moved by what
 /// the ray misses the point by, until it meets it.
 struct FrontRay {
@@ -136,8 +141,7 @@ inline FrontRay reference_front_ray(const OpticalSetup& setup, const Eigen::Vect
   FrontRay ray;
   for (int k = 0; k < 100; ++k) {
     ray.place = front_point(*setup.front, xy);
-    const Eigen::Vector3d way =
-        setup.point ? Eigen::Vector3d(ray.place - setup.point->position).normalized() : setup.light;
+    const Eigen::Vector3d way = way_to(setup, ray.place);
     ray.inside = refract_by_angles(way, front_normal(*setup.front, ray.place), 1.0 / setup.ior);
     const Eigen::Vector2d m = ray.inside.head<2>() / ray.inside.z();
     xy -= xy + (p.z() - ray.place.z()) * m - p.head<2>();
@@ -148,13 +152,14 @@ inline FrontRay reference_front_ray(const OpticalSetup& setup, const Eigen::Vect
 /// Direction of the light inside the lens at a point, or at a mirror, worked out with angles.
 inline Eigen::Vector3d reference_incident(const OpticalSetup& setup, const Eigen::Vector3d& p) {
   if (setup.front) return reference_front_ray(setup, p).inside;
-  const bool lens = setup.mode == LightMode::kRefract;
   const auto inside = [&](const Eigen::Vector3d& way) {
     return refract_by_angles(way.normalized(), Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
   };
-  if (!setup.point) return lens ? inside(setup.light) : setup.light;
-  const Eigen::Vector3d& from = setup.point->position;
-  if (!lens) return (p - from).normalized();
+  const auto place = lamp_place(setup.lamp);
+  const Eigen::Vector3d straight = way_to(setup, p);
+  if (!traits(setup.body).transmits) return straight;
+  if (!place) return inside(straight);
+  const Eigen::Vector3d& from = *place;
   // The place on the front from which a ray goes to p, by bisection of its distance from the
   // source.
   const Eigen::Vector2d across = (p - from).head<2>();

@@ -61,7 +61,7 @@ TEST(SourcePoints, ThroughAThinLensTheImageIsTurnedAndScaledByTheDistances) {
   const Eigen::Matrix2d expected = -setup.focal_length * Eigen::Matrix2d(per_mm.asDiagonal());
   EXPECT_LT((parallel - expected).norm(), 1e-5 * expected.norm());
 
-  setup.point = PointSource{{50.0, 50.0, -600.0}, Emission::kIsotropic};
+  setup.lamp = PointSource{{50.0, 50.0, -600.0}, Emission::kIsotropic};
   const Eigen::Matrix2d point = source_motion(setup, 0.0);
   EXPECT_LT((point - expected / 600.0).norm(), 1e-5 * point.norm());
 }
@@ -78,12 +78,13 @@ TEST(SourcePoints, ATiltedScreenStretchesTheImageOneWay) {
 
 TEST(SourcePoints, AMirrorsSourceIsSeenWithTheLensesYUp) {
   OpticalSetup setup;
-  setup.mode = LightMode::kReflect;
-  setup.light = {0.5, 0.0, -std::sqrt(0.75)};
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{{0.5, 0.0, -std::sqrt(0.75)}};
   // Light from higher up on the source comes down more: along −y.
   const OpticalSetup upper = lit_from(setup, {0.0, 0.01});
-  EXPECT_NEAR(upper.light.y(), -0.01, 1e-4);
-  EXPECT_NEAR(upper.light.norm(), 1.0, 1e-15);
+  const Eigen::Vector3d& way = std::get<ParallelLight>(upper.lamp).direction;
+  EXPECT_NEAR(way.y(), -0.01, 1e-4);
+  EXPECT_NEAR(way.norm(), 1.0, 1e-15);
 }
 
 }  // namespace

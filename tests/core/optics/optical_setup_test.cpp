@@ -56,7 +56,7 @@ TEST(OpticalSetup, RefusesLightThatIsNoUnitVectorTowardsTheLens) {
   for (const Eigen::Vector3d& light :
        {Eigen::Vector3d(0.0, 0.0, 2.0), Eigen::Vector3d(0.0, 0.0, -1.0),
         Eigen::Vector3d(kNan, 0.0, 1.0)}) {
-    EXPECT_THAT(refusal([&](OpticalSetup& s) { s.light = light; }),
+    EXPECT_THAT(refusal([&](OpticalSetup& s) { s.lamp = ParallelLight{light}; }),
                 ::testing::AllOf(::testing::StartsWith("light is "),
                                  ::testing::EndsWith("a unit vector towards +z")));
   }

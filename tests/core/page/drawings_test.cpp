@@ -21,15 +21,15 @@ constexpr double kHeight = 8.0;
 
 OpticalSetup mirror() {
   OpticalSetup setup;
-  setup.mode = LightMode::kReflect;
-  setup.light = {0.5, 0.0, -std::sqrt(0.75)};
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{{0.5, 0.0, -std::sqrt(0.75)}};
   setup.image_origin = {170.0, 0.0};
   return setup;
 }
 
 OpticalSetup lit_from_a_point() {
   OpticalSetup setup;
-  setup.point = PointSource{{50.0, 20.0, -600.0}, Emission::kIsotropic};
+  setup.lamp = PointSource{{50.0, 20.0, -600.0}, Emission::kIsotropic};
   return setup;
 }
 
@@ -55,9 +55,8 @@ TEST(LightDrawing, NamesLampPartScreenAndViewerForEveryLight) {
     for (const char* name : {"screen</text>", "viewer</text>", "From the side", "From above"}) {
       EXPECT_THAT(svg, HasSubstr(name));
     }
-    EXPECT_THAT(svg, HasSubstr(setup.point ? ">lamp</text>" : ">parallel light</text>"));
-    EXPECT_THAT(svg,
-                HasSubstr(setup.mode == LightMode::kReflect ? ">mirror</text>" : ">lens</text>"));
+    EXPECT_THAT(svg, HasSubstr(lamp_place(setup.lamp) ? ">lamp</text>" : ">parallel light</text>"));
+    EXPECT_THAT(svg, HasSubstr(traits(setup.body).reflects ? ">mirror</text>" : ">lens</text>"));
     EXPECT_THAT(svg, Not(HasSubstr("nan")));
     EXPECT_THAT(svg, Not(HasSubstr("inf")));
   }

@@ -81,6 +81,30 @@ TEST(Description, FieldsReadAndWriteTheirMember) {
   EXPECT_THAT(toy.name, StrEq("b"));
 }
 
+TEST(Description, NumbersComeBackFromJsonAndKeepTheirCount) {
+  Eigen::Vector3d place(0.1, -2.0, 1.0 / 3.0);
+  std::vector<double> shares;
+  Description fields;
+  fields.numbers("place", place, "").needed = true;
+  fields.numbers("shares", shares, "").zero_if_missing = true;
+  nlohmann::json written = json_of(fields);
+  EXPECT_FALSE(written.contains("shares"));
+  shares = {0.5, 0.1 + 0.2};
+  written = json_of(fields);
+  place.setZero();
+  shares.clear();
+  read_json(fields, JsonFields(written, "toy.json"));
+  EXPECT_EQ(place, Eigen::Vector3d(0.1, -2.0, 1.0 / 3.0));
+  EXPECT_EQ(shares, (std::vector<double>{0.5, 0.1 + 0.2}));
+  written["place"] = {1.0, 2.0};
+  EXPECT_THAT(message_of<InputError>([&] { read_json(fields, JsonFields(written, "toy.json")); }),
+              StrEq("toy.json: field 'place' is [1.0,2.0]: it must be three numbers"));
+  written["place"] = {1.0, 2.0, 3.0};
+  written["shares"] = {"a"};
+  EXPECT_THAT(message_of<InputError>([&] { read_json(fields, JsonFields(written, "toy.json")); }),
+              HasSubstr("'shares' is [\"a\"]: it must be a list of numbers"));
+}
+
 TEST(Description, OfAConstantBelongsToACopy) {
   const Toy toy;
   const Description fields = description_of(toy);

@@ -50,14 +50,14 @@ inline NamedSetup changed(const std::string& name,
 }
 
 inline void lit_from_a_point(OpticalSetup& setup) {
-  setup.point = PointSource{{0.5 * setup.lens_size.x() + 5.0, 0.5 * setup.lens_size.y(), -150.0},
-                            Emission::kLambertian};
+  setup.lamp = PointSource{{0.5 * setup.lens_size.x() + 5.0, 0.5 * setup.lens_size.y(), -150.0},
+                           Emission::kLambertian};
 }
 
 /// A setup with every part that an OpticalSetup can hold.
 inline std::vector<NamedSetup> all_setups() {
   const auto oblique = [](OpticalSetup& s) {
-    s.light = Eigen::Vector3d(0.25, -0.15, 1.0).normalized();
+    s.lamp = ParallelLight{Eigen::Vector3d(0.25, -0.15, 1.0).normalized()};
     const Eigen::Matrix3d turn =
         Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()).toRotationMatrix();
     s.screen_x = turn.col(0);
@@ -65,8 +65,8 @@ inline std::vector<NamedSetup> all_setups() {
     s.view = ViewSide::kRear;
   };
   const auto mirror = [](OpticalSetup& s) {
-    s.mode = LightMode::kReflect;
-    s.light = Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75));
+    s.body = MirrorBody{};
+    s.lamp = ParallelLight{Eigen::Vector3d(0.5, 0.0, -std::sqrt(0.75))};
   };
   const auto wavy = [](OpticalSetup& s) {
     lit_from_a_point(s);

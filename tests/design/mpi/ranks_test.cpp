@@ -15,6 +15,12 @@ TEST(SetupParcel, KeepsEverySetup) {
     put_setup(kind.setup, parcel);
     EXPECT_TRUE(take_setup(parcel) == kind.setup) << kind.name;
   }
+  OpticalSetup setup;
+  setup.extent = {0.5, {2, 3, {0.0, 1.0, 2.0, 0.5, 0.25, 4.0}}};
+  setup.outline = polygon_outline(setup.lens_size, {{0.0, 0.0}, {3.0, 0.0}, {1.0, 2.0}});
+  Parcel parcel;
+  put_setup(setup, parcel);
+  EXPECT_TRUE(take_setup(parcel) == setup);
 }
 
 TEST(RowSlab, EveryRowAndFaceIsOwnedOnce) {

@@ -155,8 +155,8 @@ struct Light {
 };
 
 void mirror(OpticalSetup& setup) {
-  setup.mode = LightMode::kReflect;
-  setup.light = Eigen::Vector3d(0.2, 0.1, -1.0).normalized();
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{Eigen::Vector3d(0.2, 0.1, -1.0).normalized()};
 }
 
 const std::vector<Light>& lights() {
@@ -164,7 +164,7 @@ const std::vector<Light>& lights() {
       {"Parallel", [](OpticalSetup&) {}},
       {"Point",
        [](OpticalSetup& s) {
-         s.point = PointSource{{10.0, 12.0, -90.0}, Emission::kLambertian};
+         s.lamp = PointSource{{10.0, 12.0, -90.0}, Emission::kLambertian};
        }},
       {"Mirror", mirror},
       {"Losses", [](OpticalSetup& s) { s.fresnel = true; }},

@@ -83,7 +83,7 @@ TEST(WantedPicture, StretchIsHowLandingPlacesChange) {
   check();
   setup.front = SphericalFront{150.0, {50.0, 50.0, -9.0}};
   check();
-  setup.point = PointSource{{40.0, 60.0, -300.0}, Emission::kIsotropic};
+  setup.lamp = PointSource{{40.0, 60.0, -300.0}, Emission::kIsotropic};
   check();
   setup.front.reset();
   check();

@@ -30,8 +30,8 @@ constexpr double kThickness = 5.0;  ///< mm
 OpticalSetup mirror(double degrees) {
   OpticalSetup setup = testing::setup_of({25.0, 25.0}, {32, 32}, 300.0);
   const double angle = degrees * std::numbers::pi / 180.0;
-  setup.mode = LightMode::kReflect;
-  setup.light = {std::sin(angle), 0.0, -std::cos(angle)};
+  setup.body = MirrorBody{};
+  setup.lamp = ParallelLight{{std::sin(angle), 0.0, -std::cos(angle)}};
   setup.image_origin +=
       (setup.focal_length - kThickness) * LightPath(setup).chief_slope(kThickness);
   return setup;

@@ -342,7 +342,7 @@ TEST(LevelStart, HasNoFoldedAndNoTinyTriangleForAnyPicture) {
     const SurfaceMesh start = level_start(task, fine, state.mesh);
     EXPECT_EQ(start.grid, fine.grid);
     const double mean = task.setup.lens_size.prod() / static_cast<double>(start.triangle_count());
-    EXPECT_GT(least_area(start), 10.0 * kLeastArea * mean);
+    EXPECT_GT(least_area(start), 10.0 * kMinArea * mean);
     EXPECT_TRUE(is_allowed(task, fine, start));
   }
   EXPECT_GT(folded, 0) << "no picture that shows the fault";

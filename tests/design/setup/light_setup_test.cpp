@@ -115,7 +115,7 @@ TEST(LightSetup, TheUsualScreenHasTheLensesPlaceAndSize) {
 
 TEST(LightSetup, AMirrorsPictureStandsWhereItsChiefRayLands) {
   DesignOptions options;
-  options.light.mode = LightMode::kReflect;
+  options.light.body = MirrorBody{};
   options.light.incidence = 30.0;
   const OpticalSetup setup = optical_setup(options, kPixels);
   EXPECT_NEAR(setup.screen_centre().x(), 50.0 + 295.0 * std::tan(std::numbers::pi / 6.0), 1e-10);
@@ -152,12 +152,12 @@ TEST(LightSetup, ASourceOnTheWrongSideIsRefusedWithAPlaceThatWorks) {
               StartsWith("--source point: "));
   EXPECT_THAT(refusal([&](DesignOptions& o) {
                 at(o, 4.0);
-                o.light.mode = LightMode::kReflect;
+                o.light.body = MirrorBody{};
               }),
               StartsWith("--source-position 50,40,4: "));
   EXPECT_THAT(refusal([&](DesignOptions& o) {
                 at(o, 900.0);
-                o.light.mode = LightMode::kReflect;
+                o.light.body = MirrorBody{};
               }),
               HasSubstr("beyond the surface and the source"));
 }
@@ -170,7 +170,7 @@ TEST(LightSetup, OptionsOfAnotherLightAreRefused) {
   EXPECT_THAT(
       refusal([](DesignOptions& o) { o.light.source_position = Eigen::Vector3d(0, 0, -9); }),
       StartsWith("--source-position 0,0,-9"));
-  EXPECT_THAT(refusal([](DesignOptions& o) { o.light.mode = LightMode::kReflect; }),
+  EXPECT_THAT(refusal([](DesignOptions& o) { o.light.body = MirrorBody{}; }),
               AllOf(StartsWith("--mode reflect"), HasSubstr("--incidence 30 would do")));
 }
 
