@@ -2,10 +2,12 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -80,6 +82,16 @@ TEST(CommandFrame, InterruptedWorkLeavesNoFolderBehind) {
   EXPECT_THAT(ending.err, HasSubstr("interrupted; nothing was written"));
   EXPECT_EQ(nlohmann::json::parse(ending.out)["exit_code"], kInterrupted);
   EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST(Metrics, ArePrintedWithoutInfinity) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const nlohmann::json printed =
+      metrics_json(ModelMetrics{{SurfaceModel::kFacet, {0.25, 31.5, 0.5, 0.125, 0.75}},
+                                {SurfaceModel::kSpline, {0.0, infinity, 1.0, 0.0, 1.0}}});
+  EXPECT_EQ(printed.dump(),
+            R"({"facet":{"flux_inside":0.75,"mae":0.25,"mae_linear":0.125,"psnr":31.5,"ssim":0.5},)"
+            R"("spline":{"flux_inside":1.0,"mae":0.0,"mae_linear":0.0,"psnr":null,"ssim":1.0}})");
 }
 
 TEST(CommandFrame, InputCountsAsAcceptedOnceWorkIsReported) {
