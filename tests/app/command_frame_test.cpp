@@ -21,9 +21,7 @@ struct Settings {
   std::string out;
 };
 
-void add_options(OptionSet& options, Settings& settings) {
-  options.text("--out", settings.out, "DIR", "where");
-}
+void describe(Description& d, Settings& settings) { d.text("--out", settings.out, "DIR", "where"); }
 
 struct Ending {
   int exit_code = 0;
@@ -36,7 +34,7 @@ Ending run_with(CommandResult (*work)(CommandFrame& frame, Settings& settings),
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
   Ending ending;
-  ending.exit_code = run_command<Settings>({"try", "Tries.", add_options, work}, arguments);
+  ending.exit_code = run_command<Settings>({"try", "Tries.", work}, arguments);
   ending.out = ::testing::internal::GetCapturedStdout();
   ending.err = ::testing::internal::GetCapturedStderr();
   return ending;
