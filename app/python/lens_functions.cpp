@@ -139,7 +139,7 @@ void add_lens(py::module_& module) {
       "model", [](const LensObject& self) { return model_name(self.lens().model); },
       "str: the surface model that it was designed with.");
   type.def_property_readonly(
-      "metrics", [](const LensObject& self) { return object_from(app::metrics_json(self.lens())); },
+      "metrics", [](const LensObject& self) { return object_from(metrics_json(self.lens())); },
       "dict: for every surface model how close its picture is to the target.");
   type.def_property_readonly(
       "provenance",

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/lens/lens.h"
 
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -43,29 +41,6 @@ constexpr std::uintmax_t kMaxJsonBytes = std::uintmax_t{1} << 20U;
 
 std::string size_text(int columns, int rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
-}
-
-ordered_json to_json(const ImageMetrics& metrics) {
-  // JSON knows no infinity: the PSNR of equal pictures is stored as null.
-  const ordered_json psnr =
-      std::isfinite(metrics.psnr) ? ordered_json(metrics.psnr) : ordered_json(nullptr);
-  return {{"mae", metrics.mae},
-          {"psnr", psnr},
-          {"ssim", metrics.ssim},
-          {"flux_inside", metrics.flux_inside},
-          {"mae_linear", metrics.mae_linear}};
-}
-
-ordered_json to_json(const ModelMetrics& metrics) {
-  ordered_json by_model;
-  for (const auto& [model, one] : metrics) by_model[model_name(model)] = to_json(one);
-  return by_model;
-}
-
-ordered_json metrics_json(const Lens& lens) {
-  ordered_json by_model = to_json(lens.metrics);
-  if (lens.source_limit) by_model[kSourceLimit] = to_json(*lens.source_limit);
-  return by_model;
 }
 
 ordered_json to_json(const Lens& lens) {
@@ -150,19 +125,6 @@ json read_json(const fs::path& path) {
   return parse_json(read_whole_file(path, kMaxJsonBytes), path.string());
 }
 
-/// The value that belongs to a word.
-template <class Value>
-Value choice(const JsonFields& fields, const std::string& name,
-             const std::vector<std::pair<std::string, Value>>& words) {
-  const std::string text = fields.text(name);
-  std::string rule = "it must be";
-  for (const auto& [word, value] : words) {
-    if (text == word) return value;
-    rule += (word == words.front().first ? " \"" : " or \"") + word + "\"";
-  }
-  fields.refuse(name, rule);
-}
-
 void check_supported(const JsonFields& fields) {
   if (fields.text("format") != kFormat) {
     fields.refuse("format", std::string("only \"") + kFormat + "\" can be read");
@@ -190,12 +152,7 @@ OpticalSetup read_setup(const JsonFields& fields, const fs::path& folder, const 
 
 ImageMetrics read_metrics(const JsonFields& fields) {
   ImageMetrics metrics;
-  metrics.mae = fields.number("mae");
-  metrics.psnr =
-      fields.at("psnr").is_null() ? std::numeric_limits<double>::infinity() : fields.number("psnr");
-  metrics.ssim = fields.number("ssim");
-  metrics.flux_inside = fields.number("flux_inside");
-  if (fields.has("mae_linear")) metrics.mae_linear = fields.number("mae_linear");
+  read_json(description_of(metrics), fields);
   return metrics;
 }
 
@@ -291,6 +248,20 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
 
 }  // namespace
 
+ordered_json metrics_json(const ImageMetrics& metrics) { return json_of(description_of(metrics)); }
+
+ordered_json metrics_json(const ModelMetrics& metrics) {
+  ordered_json by_model;
+  for (const auto& [model, one] : metrics) by_model[model_name(model)] = metrics_json(one);
+  return by_model;
+}
+
+ordered_json metrics_json(const Lens& lens) {
+  ordered_json by_model = metrics_json(lens.metrics);
+  if (lens.source_limit) by_model[kSourceLimit] = metrics_json(*lens.source_limit);
+  return by_model;
+}
+
 Provenance::Provenance() : Provenance(json::object()) {}
 
 Provenance::Provenance(nlohmann::json object)
@@ -345,7 +316,9 @@ Lens read_lens(const fs::path& folder) {
   check_supported(fields);
   Lens lens;
   lens.setup = read_setup(fields, folder, path.string());
-  lens.model = choice<SurfaceModel>(fields, "model", named_models());
+  Description named;
+  named.word("model", lens.model, named_models(), "").needed = true;
+  read_json(named, fields);
   if (lens.model == SurfaceModel::kSpline)
     lens.spline = read_own_spline(fields, lens.setup, folder);
   const JsonFields metrics = fields.object("metrics");

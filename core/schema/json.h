@@ -57,12 +57,19 @@ class JsonFields {
 };
 
 /// A described object, its fields in the description's order. Numbers that 0 stands for are left
-/// out.
+/// out, those that null stands for are null.
 nlohmann::ordered_json json_of(const Description& description);
 
 /// Reads it back: a field that is not needed keeps its value if it is missing. @throw InputError
 /// naming file, field, value and rule.
 void read_json(const Description& description, const JsonFields& fields);
+
+/// The values of an object's fields as an array, for a row of a table.
+nlohmann::json row_of(const Description& description);
+
+/// Reads such an array back; its values are not checked against limits. @throw json::exception if
+/// one is missing or of another type.
+void read_row(const Description& description, const nlohmann::json& row);
 
 /// Appends the values that a fingerprint holds to an array.
 void append_fingerprint(const Description& description, nlohmann::json& array);
