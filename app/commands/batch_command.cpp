@@ -36,25 +36,22 @@ struct BatchSettings {
 
 constexpr int kMaxParallel = 1024;
 
-void add_batch_options(OptionSet& options, BatchSettings& settings) {
-  options.positional(
-      "JOBS", settings.jobs_file,
-      "JSON lines, a job each: {\"name\": \"a\", \"command\": \"design\", \"target\": "
-      "\"a.png\", \"options\": {\"focal\": 250}, \"then\": [\"cam\", {\"command\": \"export\", "
-      "\"options\": {\"out\": \"a.stl\"}}]}; first design or reflect, then cam, export or render");
-  options.required_text("--out", settings.out, "DIR", "where every job gets a folder of its name");
-  options.text("--shard", settings.shard, "I/N", "of every N jobs only the I-th, I from 1 to N");
-  options.texts("--grid", settings.grid, "OPTION=VALUES",
-                "every job with every combination of these: focal=250,300 cam.pitch=0.05,0.06");
-  Description d;
+void describe(Description& d, BatchSettings& settings) {
+  d.text(
+       "JOBS", settings.jobs_file, "",
+       "JSON lines, a job each: {\"name\": \"a\", \"command\": \"design\", \"target\": "
+       "\"a.png\", \"options\": {\"focal\": 250}, \"then\": [\"cam\", {\"command\": \"export\", "
+       "\"options\": {\"out\": \"a.stl\"}}]}; first design or reflect, then cam, export or render")
+      .needed = true;
+  d.text("--out", settings.out, "DIR", "where every job gets a folder of its name").needed = true;
+  d.text("--shard", settings.shard, "I/N", "of every N jobs only the I-th, I from 1 to N");
+  d.texts("--grid", settings.grid, "OPTION=VALUES",
+          "every job with every combination of these: focal=250,300 cam.pitch=0.05,0.06");
   d.whole("--parallel", settings.parallel, Limits::between(1, kMaxParallel),
           "jobs at the same time; they share --threads");
-  options.add(d);
-  options.text("--table", settings.table, "FILE.csv",
-               "write all jobs' options and results into a table");
-  options.flag(
-      "--force", settings.force,
-      "do jobs again that were done with other options; replace a --table of other origin");
+  d.text("--table", settings.table, "FILE.csv", "write all jobs' options and results into a table");
+  d.flag("--force", settings.force,
+         "do jobs again that were done with other options; replace a --table of other origin");
 }
 
 /// I of N.
@@ -212,8 +209,7 @@ CommandResult run(CommandFrame& frame, BatchSettings& settings) {
 
 int batch_command(const Arguments& arguments) {
   return run_command<BatchSettings>(
-      {"batch", "Does the jobs of a file, each in a folder of its own.", add_batch_options, run},
-      arguments);
+      {"batch", "Does the jobs of a file, each in a folder of its own.", run}, arguments);
 }
 
 }  // namespace lensforge::app

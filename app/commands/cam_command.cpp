@@ -33,18 +33,16 @@ std::string folder_name(const fs::path& folder) {
   return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
 }
 
-void add_cam_options(OptionSet& options, CamSettings& settings) {
-  options.text("DIR", settings.source, "", "lens folder; --show-workshop needs none");
-  options.text("--workshop", settings.workshop, "FILE.toml",
-               "machine, blank, clamps, tools and process; options given here win");
-  options.flag("--show-workshop", settings.show_workshop,
-               "print the workshop in use as TOML and exit");
-  options.texts(
-      "--compare", settings.compare, "KEY=VALUE,…",
-      "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
-      "pitch=0.04,0.06 slope=3e-5,6e-5 large=0,4 (finishing only); mae=0.004 recommends the "
-      "quickest that reaches it");
-  options.fields(settings.cam);
+void describe(Description& d, CamSettings& settings) {
+  d.text("DIR", settings.source, "", "lens folder; --show-workshop needs none");
+  d.text("--workshop", settings.workshop, "FILE.toml",
+         "machine, blank, clamps, tools and process; options given here win");
+  d.flag("--show-workshop", settings.show_workshop, "print the workshop in use as TOML and exit");
+  d.texts("--compare", settings.compare, "KEY=VALUE,…",
+          "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
+          "pitch=0.04,0.06 slope=3e-5,6e-5 large=0,4 (finishing only); mae=0.004 recommends the "
+          "quickest that reaches it");
+  describe(d, settings.cam);
 }
 
 void take_workshop(OptionSet& options, const std::string& file, CamOptions& cam) {
@@ -204,8 +202,7 @@ CommandResult run(CommandFrame& frame, CamSettings& settings) {
 
 int cam_command(const Arguments& arguments) {
   return run_command<CamSettings>(
-      {"cam", "Makes the programs that mill a lens and predicts what it will project.",
-       add_cam_options, run},
+      {"cam", "Makes the programs that mill a lens and predicts what it will project.", run},
       arguments);
 }
 

@@ -30,8 +30,8 @@ struct CamSettings {
 /// Returns a folder's own name, also for "." or a path with a trailing slash.
 std::string folder_name(const std::filesystem::path& folder);
 
-/// Adds every option of the command.
-void add_cam_options(OptionSet& options, CamSettings& settings);
+/// Describes every option of the command.
+void describe(Description& d, CamSettings& settings);
 
 /// Overrides the workshop file with the given options. @throw InputError naming file or option,
 /// value and rule.

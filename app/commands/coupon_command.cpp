@@ -17,18 +17,18 @@
 
 namespace lensforge::app {
 
-void add_coupon_options(OptionSet& options, CouponSettings& settings) {
-  options.required_text("--out", settings.out, "DIR|FILE",
-                        "folder for program, sheet and file of readings; with --fit the workshop "
-                        "file to write");
-  options.text(
-      "--fit", settings.fit, "FILE.toml",
-      "fit the workshop to these readings of a coupon instead of making one: polish.sigma, "
-      "the finishing ball's diameter and finish.pitch_error");
-  options.text("--workshop", settings.workshop, "FILE.toml",
-               "the workshop that cuts the coupon; the fitted one differs from it in these values "
-               "only");
-  options.fields(settings.coupon);
+void describe(Description& d, CouponSettings& settings) {
+  d.text("--out", settings.out, "DIR|FILE",
+         "folder for program, sheet and file of readings; with --fit the workshop "
+         "file to write")
+      .needed = true;
+  d.text("--fit", settings.fit, "FILE.toml",
+         "fit the workshop to these readings of a coupon instead of making one: polish.sigma, "
+         "the finishing ball's diameter and finish.pitch_error");
+  d.text("--workshop", settings.workshop, "FILE.toml",
+         "the workshop that cuts the coupon; the fitted one differs from it in these values "
+         "only");
+  describe(d, settings.coupon);
 }
 
 void settle(const OptionSet& options, CouponSettings& settings) {
@@ -143,8 +143,7 @@ CommandResult run(CommandFrame& frame, CouponSettings& settings) {
 
 int coupon_command(const Arguments& arguments) {
   return run_command<CouponSettings>(
-      {"coupon", "Makes a test piece that calibrates a workshop, or fits the workshop to it.",
-       add_coupon_options, run},
+      {"coupon", "Makes a test piece that calibrates a workshop, or fits the workshop to it.", run},
       arguments);
 }
 

@@ -17,8 +17,8 @@ struct CouponSettings {
   CouponOptions coupon;
 };
 
-/// Adds every option of the command.
-void add_coupon_options(OptionSet& options, CouponSettings& settings);
+/// Describes every option of the command.
+void describe(Description& d, CouponSettings& settings);
 
 /// Reads the workshop. @throw InputError naming file or option, value and rule, also if an option
 /// of the cut is given with --fit.

@@ -111,33 +111,32 @@ void require_wide_drawing(const Image& drawing, const DesignSettings& settings) 
 
 }  // namespace
 
-void add_design_options(OptionSet& options, DesignSettings& settings) {
-  options.positional("TARGET", settings.target,
-                     "picture to project: PNG, JPEG, TIFF, EXR, SVG, ...");
-  options.required_text("--out", settings.out, "DIR", "lens folder to write");
-  options.fields(settings.design);
-  options.fields(settings.design.light);
-  options.text("--source-picture", settings.source_picture, "FILE",
-               "picture of the lamp as seen from the lens, as wide as --source-angle or "
-               "--source-size; without it the lamp is an evenly lit disc");
-  options.text(
-      "--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
-      "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
-      "in a picture, seen from the cutter's side");
-  options.fields(settings.background);
-  options.fields(settings.design.weights);
-  options.text("--made-by", settings.made_by, "default|FILE.toml",
-               "shape the part that this workshop cuts and polishes, not the surface alone");
-  options.flag("--robust", settings.robust,
-               "with --made-by: right on average over parts that are polished less and more by the "
-               "workshop's tolerances.polish_sigma; takes twice as long");
-  options.add(part_options(settings.cut));
-  options.text("--live", settings.live, "PORT",
-               "serve a page that shows the design while it runs, to browsers on this machine; 0 "
-               "takes a free port");
-  options.flag("--resume", settings.resume,
-               "continue the interrupted design in --out, with the same picture and options");
-  options.flag("--force", settings.force, "replace the design that --out holds");
+void describe(Description& d, DesignSettings& settings) {
+  d.text("TARGET", settings.target, "", "picture to project: PNG, JPEG, TIFF, EXR, SVG, ...")
+      .needed = true;
+  d.text("--out", settings.out, "DIR", "lens folder to write").needed = true;
+  describe(d, settings.design);
+  describe(d, settings.design.light);
+  d.text("--source-picture", settings.source_picture, "FILE",
+         "picture of the lamp as seen from the lens, as wide as --source-angle or "
+         "--source-size; without it the lamp is an evenly lit disc");
+  d.text("--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
+         "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
+         "in a picture, seen from the cutter's side");
+  describe(d, settings.background);
+  describe(d, settings.design.weights);
+  d.text("--made-by", settings.made_by, "default|FILE.toml",
+         "shape the part that this workshop cuts and polishes, not the surface alone");
+  d.flag("--robust", settings.robust,
+         "with --made-by: right on average over parts that are polished less and more by the "
+         "workshop's tolerances.polish_sigma; takes twice as long");
+  d.add(part_options(settings.cut));
+  d.text("--live", settings.live, "PORT",
+         "serve a page that shows the design while it runs, to browsers on this machine; 0 "
+         "takes a free port");
+  d.flag("--resume", settings.resume,
+         "continue the interrupted design in --out, with the same picture and options");
+  d.flag("--force", settings.force, "replace the design that --out holds");
 }
 
 LoadedImage read_target(const DesignSettings& settings, const RunControl& control) {
@@ -628,8 +627,8 @@ CommandResult run(CommandFrame& frame, DesignSettings& settings) {
 }  // namespace
 
 int design_command(const Arguments& arguments) {
-  return run_command<DesignSettings>(
-      {"design", "Shapes a lens that projects a picture.", add_design_options, run}, arguments);
+  return run_command<DesignSettings>({"design", "Shapes a lens that projects a picture.", run},
+                                     arguments);
 }
 
 }  // namespace lensforge::app

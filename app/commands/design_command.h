@@ -33,8 +33,8 @@ struct DesignSettings {
   bool force = false;
 };
 
-/// Adds every option of the command.
-void add_design_options(OptionSet& options, DesignSettings& settings);
+/// Describes every option of the command.
+void describe(Description& d, DesignSettings& settings);
 
 /// Reads the picture to project. @throw InputError; Interrupted.
 LoadedImage read_target(const DesignSettings& settings, const RunControl& control);

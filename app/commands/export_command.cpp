@@ -155,15 +155,13 @@ std::string remedy_for(const SplineSolid& solid, ExportSurface surface) {
 
 }  // namespace
 
-void add_export_options(OptionSet& options, ExportSettings& settings) {
-  options.positional("DIR", settings.source, "lens folder");
-  options.required_text("--out", settings.out, "FILE", "file to write; its folder is created");
-  Description source;
-  source.word("--surface", settings.surface,
-              {{"designed", ExportSurface::kDesigned}, {"milled", ExportSurface::kMilled}},
-              "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply");
-  options.add(source);
-  options.fields(settings.options);
+void describe(Description& d, ExportSettings& settings) {
+  d.text("DIR", settings.source, "", "lens folder").needed = true;
+  d.text("--out", settings.out, "FILE", "file to write; its folder is created").needed = true;
+  d.word("--surface", settings.surface,
+         {{"designed", ExportSurface::kDesigned}, {"milled", ExportSurface::kMilled}},
+         "the lens's surface, or what the cutter leaves: DIR/cam/milled.ply");
+  describe(d, settings.options);
 }
 
 void require_fitting_options(const OptionSet& options, ExportFormat format) {
@@ -212,8 +210,7 @@ CommandResult run(CommandFrame& frame, ExportSettings& settings) {
 
 int export_command(const Arguments& arguments) {
   return run_command<ExportSettings>(
-      {"export", "Writes a lens as a closed solid or height map for other programs.",
-       add_export_options, run},
+      {"export", "Writes a lens as a closed solid or height map for other programs.", run},
       arguments);
 }
 

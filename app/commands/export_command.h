@@ -17,8 +17,8 @@ struct ExportSettings {
   ExportOptions options;
 };
 
-/// Adds every option of the command.
-void add_export_options(OptionSet& options, ExportSettings& settings);
+/// Describes every option of the command.
+void describe(Description& d, ExportSettings& settings);
 
 /// @throw InputError naming an option that was given but does not apply to the format.
 void require_fitting_options(const OptionSet& options, ExportFormat format);

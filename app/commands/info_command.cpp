@@ -380,10 +380,10 @@ struct InfoSettings {
   Background background;
 };
 
-void add_info_options(OptionSet& options, InfoSettings& settings) {
-  options.positional("SOURCE", settings.source,
-                     "lens folder, solid, mesh, picture or G-code program");
-  options.fields(settings.background);
+void describe(lensforge::Description& d, InfoSettings& settings) {
+  d.text("SOURCE", settings.source, "", "lens folder, solid, mesh, picture or G-code program")
+      .needed = true;
+  describe(d, settings.background);
 }
 
 CommandResult run(CommandFrame& frame, InfoSettings& settings) {
@@ -406,8 +406,7 @@ CommandResult run(CommandFrame& frame, InfoSettings& settings) {
 
 int info_command(const Arguments& arguments) {
   return run_command<InfoSettings>(
-      {"info", "Says what a lens folder, solid, mesh, picture or G-code program is.",
-       add_info_options, run},
+      {"info", "Says what a lens folder, solid, mesh, picture or G-code program is.", run},
       arguments);
 }
 

@@ -45,8 +45,7 @@ void set_blank(NestOptions& options, const std::string& text) {
   if (numbers.size() > 2) options.thickness = numbers[2];
 }
 
-Description describe_sheet(NestOptions& options) {
-  Description d;
+void describe_sheet(Description& d, NestOptions& options) {
   d.text(
       {.name = kBlank,
        .help = "width and height of the common blank, and its thickness where it is more than "
@@ -56,19 +55,19 @@ Description describe_sheet(NestOptions& options) {
       [&options](const std::string& text) { set_blank(options, text); });
   d.length("--gap", options.gap, Limits::between(0, kWidestGap),
            "between lenses, at least; 0: the least that the tools need");
-  return d;
 }
 
 }  // namespace
 
-void add_nest_options(OptionSet& options, NestSettings& settings) {
-  options.texts("DIR", settings.sources, "", "lens folders; one named twice is cut twice");
-  options.required_text("--out", settings.out, "DIR",
-                        "folder for programs, layout and a folder of reports of each lens");
-  options.add(describe_sheet(settings.nest));
-  options.text("--workshop", settings.workshop, "FILE.toml",
-               "machine, blank, clamps, tools and process; options given here win");
-  options.fields(settings.nest.cam);
+void describe(Description& d, NestSettings& settings) {
+  d.texts("DIR", settings.sources, "", "lens folders; one named twice is cut twice");
+  d.text("--out", settings.out, "DIR",
+         "folder for programs, layout and a folder of reports of each lens")
+      .needed = true;
+  describe_sheet(d, settings.nest);
+  d.text("--workshop", settings.workshop, "FILE.toml",
+         "machine, blank, clamps, tools and process; options given here win");
+  describe(d, settings.nest.cam);
 }
 
 void settle(OptionSet& options, NestSettings& settings) {
@@ -215,7 +214,7 @@ int nest_command(const Arguments& arguments) {
       {"nest",
        "Makes programs that mill several lenses of one blank with one zero, and predicts what each "
        "will project.",
-       add_nest_options, run},
+       run},
       arguments);
 }
 

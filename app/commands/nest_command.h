@@ -20,8 +20,8 @@ struct NestSettings {
   NestOptions nest;
 };
 
-/// Adds every option of the command.
-void add_nest_options(OptionSet& options, NestSettings& settings);
+/// Describes every option of the command.
+void describe(Description& d, NestSettings& settings);
 
 /// Overrides the workshop file with the given options. @throw InputError naming file or option,
 /// value and rule.

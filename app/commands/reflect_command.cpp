@@ -20,15 +20,15 @@
 
 namespace lensforge::app {
 
-void add_reflect_options(OptionSet& options, ReflectSettings& settings) {
-  options.positional("MESH", settings.mesh,
-                     "shape: .stl, .obj, .ply, .off; solid: .step, .stp; z is up");
-  options.text("--out", settings.out, "DIR", "folder for the new shape, its pictures and figures");
-  options.flag("--evaluate", settings.evaluate,
-               "print the reflected energies of the mesh as it is and write nothing");
-  options.flag("--resume", settings.resume,
-               "continue the interrupted run in --out, with the same mesh and options");
-  options.fields(settings.reflect);
+void describe(Description& d, ReflectSettings& settings) {
+  d.text("MESH", settings.mesh, "", "shape: .stl, .obj, .ply, .off; solid: .step, .stp; z is up")
+      .needed = true;
+  d.text("--out", settings.out, "DIR", "folder for the new shape, its pictures and figures");
+  d.flag("--evaluate", settings.evaluate,
+         "print the reflected energies of the mesh as it is and write nothing");
+  d.flag("--resume", settings.resume,
+         "continue the interrupted run in --out, with the same mesh and options");
+  describe(d, settings.reflect);
 }
 
 namespace {
@@ -191,8 +191,7 @@ CommandResult run(CommandFrame& frame, ReflectSettings& settings) {
 
 int reflect_command(const Arguments& arguments) {
   return run_command<ReflectSettings>(
-      {"reflect", "Deforms a mesh so that it reflects light as wanted.", add_reflect_options, run},
-      arguments);
+      {"reflect", "Deforms a mesh so that it reflects light as wanted.", run}, arguments);
 }
 
 }  // namespace lensforge::app

@@ -17,7 +17,7 @@ struct ReflectSettings {
   reflect::ReflectOptions reflect;
 };
 
-/// Adds every option of the command.
-void add_reflect_options(OptionSet& options, ReflectSettings& settings);
+/// Describes every option of the command.
+void describe(Description& d, ReflectSettings& settings);
 
 }  // namespace lensforge::app

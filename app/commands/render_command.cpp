@@ -45,15 +45,16 @@ struct Scene {
   std::optional<Image> target;
 };
 
-void add_render_options(OptionSet& options, RenderArguments& arguments) {
-  options.positional("SOURCE", arguments.source,
-                     "lens folder; mesh: .ply, .obj, .stl, .off; "
-                     "solid: .step, .stp");
-  options.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
-  options.flag("--force", arguments.force, "replace a file that lensforge did not write");
-  options.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
-  options.fields(arguments.background);
-  options.fields(arguments.render);
+void describe(Description& d, RenderArguments& arguments) {
+  d.text("SOURCE", arguments.source, "",
+         "lens folder; mesh: .ply, .obj, .stl, .off; "
+         "solid: .step, .stp")
+      .needed = true;
+  d.text("--out", arguments.out, "FILE", "write the picture to this .png or .exr");
+  d.flag("--force", arguments.force, "replace a file that lensforge did not write");
+  d.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
+  describe(d, arguments.background);
+  describe(d, arguments.render);
 }
 
 Scene load_solid(const std::string& source, CommandFrame& frame) {
@@ -298,8 +299,7 @@ CommandResult run(CommandFrame& frame, RenderArguments& arguments) {
 
 int render_command(const Arguments& arguments) {
   return run_command<RenderArguments>(
-      {"render", "Renders a lens, mesh or STEP solid and compares it with its target.",
-       add_render_options, run},
+      {"render", "Renders a lens, mesh or STEP solid and compares it with its target.", run},
       arguments);
 }
 

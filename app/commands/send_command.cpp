@@ -26,15 +26,15 @@
 
 namespace lensforge::app {
 
-void add_send_options(OptionSet& options, SendSettings& settings) {
-  options.positional("FILE", settings.file, "G-code program");
-  options.fields(settings.job);
-  options.flag("--yes", settings.yes, "do not ask before resuming");
-  options.text("--log", settings.log, "FILE",
-               "log file, appended to an earlier one; default FILE.ngc.log");
-  options.text("--events", settings.events, "FILE",
-               "append what happens as JSON, one object a line: to an earlier events file, a new "
-               "one or a pipe; - is standard output");
+void describe(Description& d, SendSettings& settings) {
+  d.text("FILE", settings.file, "", "G-code program").needed = true;
+  describe(d, settings.job);
+  d.flag("--yes", settings.yes, "do not ask before resuming");
+  d.text("--log", settings.log, "FILE",
+         "log file, appended to an earlier one; default FILE.ngc.log");
+  d.text("--events", settings.events, "FILE",
+         "append what happens as JSON, one object a line: to an earlier events file, a new "
+         "one or a pipe; - is standard output");
 }
 
 namespace {
@@ -351,7 +351,7 @@ int send_command(const Arguments& arguments) {
       {"send",
        "Streams a G-code program to a Grbl-family controller. Keys while it runs: " +
            std::string(kKeyHelp) + ".",
-       add_send_options, run},
+       run},
       arguments);
 }
 

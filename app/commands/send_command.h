@@ -23,8 +23,8 @@ struct SendSettings {
   }
 };
 
-/// Adds every option of the command.
-void add_send_options(OptionSet& options, SendSettings& settings);
+/// Describes every option of the command.
+void describe(Description& d, SendSettings& settings);
 
 /// "done", "interrupted" or "fault".
 std::string status_word(SendStatus status);

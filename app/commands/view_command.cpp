@@ -25,11 +25,10 @@ struct ViewSettings {
   bool force = false;
 };
 
-/// Adds every option of the command.
-void add_view_options(OptionSet& options, ViewSettings& settings) {
-  options.positional("DIR", settings.source, "lens folder");
-  options.required_text("--out", settings.out, "FILE", "the page to write, .html");
-  options.flag("--force", settings.force, "replace a file that lensforge did not write");
+void describe(Description& d, ViewSettings& settings) {
+  d.text("DIR", settings.source, "", "lens folder").needed = true;
+  d.text("--out", settings.out, "FILE", "the page to write, .html").needed = true;
+  d.flag("--force", settings.force, "replace a file that lensforge did not write");
 }
 
 void require_page_name(const std::string& out) {
@@ -79,9 +78,7 @@ CommandResult run(CommandFrame& frame, ViewSettings& settings) {
 
 int view_command(const Arguments& arguments) {
   return run_command<ViewSettings>(
-      {"view", "Writes a page that draws a lens's light and lets one change it.", add_view_options,
-       run},
-      arguments);
+      {"view", "Writes a page that draws a lens's light and lets one change it.", run}, arguments);
 }
 
 }  // namespace lensforge::app

@@ -116,12 +116,12 @@ class CommandFrame {
   std::unique_ptr<Work> work_;
 };
 
-/// A command: its name, a sentence for --help, its options and its work.
+/// A command: its name, a sentence for --help and its work. The description of its settings has its
+/// options.
 template <class Settings>
 struct Command {
   std::string name;
   std::string description;
-  void (*add_options)(OptionSet& options, Settings& settings);
   CommandResult (*run)(CommandFrame& frame, Settings& settings);
 };
 
@@ -133,7 +133,7 @@ template <class Settings>
 int run_command(const Command<Settings>& command, const Arguments& arguments) {
   Settings settings;
   OptionSet options(command.name, command.description);
-  command.add_options(options, settings);
+  options.fields(settings);
   return run_framed(command.name, options, arguments,
                     [&](CommandFrame& frame) { return command.run(frame, settings); });
 }

@@ -2,22 +2,12 @@
 #include "app/frame/common_output.h"
 
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "app/frame/console.h"
 
 namespace lensforge::app {
-
-nlohmann::json metrics_json(const ImageMetrics& metrics) {
-  const bool finite = std::isfinite(metrics.psnr);
-  return {{"mae", metrics.mae},
-          {"psnr", finite ? nlohmann::json(metrics.psnr) : nlohmann::json(nullptr)},
-          {"ssim", metrics.ssim},
-          {"mae_linear", metrics.mae_linear},
-          {"flux_inside", metrics.flux_inside}};
-}
 
 std::string metrics_text(const ImageMetrics& metrics) {
   return "MAE " + fixed(metrics.mae, 4) + "  PSNR " + fixed(metrics.psnr, 1) + " dB  SSIM " +
@@ -31,12 +21,6 @@ std::string fixed(double value, int digits) {
   return text.data();
 }
 
-nlohmann::json metrics_json(const ModelMetrics& metrics) {
-  nlohmann::json by_model;
-  for (const auto& [model, one] : metrics) by_model[model_name(model)] = metrics_json(one);
-  return by_model;
-}
-
 std::string metrics_text(const ModelMetrics& metrics) {
   std::string text;
   for (const auto& [model, one] : metrics) {
@@ -44,12 +28,6 @@ std::string metrics_text(const ModelMetrics& metrics) {
     text += "  " + name + std::string(8 - name.size(), ' ') + metrics_text(one) + "\n";
   }
   return text;
-}
-
-nlohmann::json metrics_json(const Lens& lens) {
-  nlohmann::json by_model = metrics_json(lens.metrics);
-  if (lens.source_limit) by_model["source_limit"] = metrics_json(*lens.source_limit);
-  return by_model;
 }
 
 std::string metrics_text(const Lens& lens) {

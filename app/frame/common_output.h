@@ -16,13 +16,6 @@ namespace lensforge::app {
 
 class Console;
 
-/// {"mae", "psnr", "ssim", "mae_linear", "flux_inside"}; psnr is null where it is infinite.
-nlohmann::json metrics_json(const ImageMetrics& metrics);
-/// An object with the metrics of every model.
-nlohmann::json metrics_json(const ModelMetrics& metrics);
-/// The lens's metrics, with "source_limit" if its source has an extent.
-nlohmann::json metrics_json(const Lens& lens);
-
 /// One line: "MAE 0.0123  PSNR 31.2 dB  SSIM 0.961  linear MAE 0.0042  flux inside 99.8 %".
 std::string metrics_text(const ImageMetrics& metrics);
 /// One line per model.

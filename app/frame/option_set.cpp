@@ -173,6 +173,14 @@ struct OptionSet::Parser {
   Parser(const std::string& command, const std::string& description)
       : app(description, "lensforge " + command) {}
 
+  BoundOption& find(const std::string& name) {
+    const auto found = std::find_if(options.begin(), options.end(), [&](const BoundOption& option) {
+      return option.field.name == name;
+    });
+    LF_CHECK(found != options.end(), name);
+    return *found;
+  }
+
   CLI::App app;
   std::deque<BoundOption> options;  ///< Those of the command, then the common ones.
   std::size_t own = 0;              ///< Of the command.
@@ -221,37 +229,6 @@ void OptionSet::restate() {
   }
 }
 
-void OptionSet::positional(const std::string& name, std::string& value, const std::string& help) {
-  required_text(name, value, "", help);
-}
-
-void OptionSet::required_text(const std::string& name, std::string& value, const std::string& type,
-                              const std::string& help) {
-  Description d;
-  d.text(name, value, type, help).needed = true;
-  add(d);
-}
-
-void OptionSet::text(const std::string& name, std::string& value, const std::string& type,
-                     const std::string& help) {
-  Description d;
-  d.text(name, value, type, help);
-  add(d);
-}
-
-void OptionSet::texts(const std::string& name, std::vector<std::string>& values,
-                      const std::string& type, const std::string& help) {
-  Description d;
-  d.texts(name, values, type, help);
-  add(d);
-}
-
-void OptionSet::flag(const std::string& name, bool& value, const std::string& help) {
-  Description d;
-  d.flag(name, value, help);
-  add(d);
-}
-
 void OptionSet::add_common() {
   parser_->own = parser_->options.size();
   add(describe_common(common_));
@@ -295,6 +272,16 @@ void OptionSet::parse(const Arguments& arguments) {
   } catch (const CLI::ParseError& e) {
     throw InputError(std::string(e.what()) + "; " + app.get_name() + " --help lists the options");
   }
+  apply();
+}
+
+void OptionSet::take(const OptionValues& values) {
+  add_common();
+  for (const auto& [name, value] : values) parser_->find(name).given = value;
+  apply();
+}
+
+void OptionSet::apply() {
   restate();
   if (common_.device == "cuda") {
     const Gpu gpu = find_gpu();
@@ -302,7 +289,7 @@ void OptionSet::parse(const Arguments& arguments) {
   }
 }
 
-bool OptionSet::given(const std::string& name) const { return parser_->app.count(name) > 0; }
+bool OptionSet::given(const std::string& name) const { return parser_->find(name).is_given(); }
 
 nlohmann::json OptionSet::used() const {
   nlohmann::json object = nlohmann::json::object();

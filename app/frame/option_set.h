@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -38,6 +39,9 @@ struct CommonOptions {
   std::string device = "auto";
 };
 
+/// Values of options by their names as typed, each of its option's type.
+using OptionValues = std::map<std::string, FieldValue>;
+
 /// Device on which a command computes.
 struct ChosenDevice {
   Executor executor;
@@ -53,16 +57,6 @@ class OptionSet {
   OptionSet(const OptionSet&) = delete;
   OptionSet& operator=(const OptionSet&) = delete;
 
-  void positional(const std::string& name, std::string& value, const std::string& help);
-  void required_text(const std::string& name, std::string& value, const std::string& type,
-                     const std::string& help);
-  void text(const std::string& name, std::string& value, const std::string& type,
-            const std::string& help);
-  /// Adds an option with one or more words, up to the next option.
-  void texts(const std::string& name, std::vector<std::string>& values, const std::string& type,
-             const std::string& help);
-  void flag(const std::string& name, bool& value, const std::string& help);
-
   /// Adds an option for every field. @param options  receives the values; must outlive the set.
   template <class Options>
   void fields(Options& options) {
@@ -73,11 +67,14 @@ class OptionSet {
   /// Reads the arguments. Call it once, after all options were added.
   /// @throw HelpText; ListedOptions; InputError naming option, value and rule.
   void parse(const Arguments& arguments);
+  /// Takes values instead; call it once, in place of parse(). Options that must be given need not
+  /// be. @pre the options exist and their limits hold. @throw InputError as parse().
+  void take(const OptionValues& values);
 
   /// Assigns all given values again, after the defaults below them have changed.
   void restate();
 
-  /// True if the command line or the configuration file sets the option.
+  /// True if the command line, the configuration file or take() sets the option.
   [[nodiscard]] bool given(const std::string& name) const;
   /// All options of the command with their values, without the common ones.
   [[nodiscard]] nlohmann::json used() const;
@@ -92,6 +89,8 @@ class OptionSet {
 
   void bind(const Field& field);
   void add_common();
+  /// restate(), and a check of the device.
+  void apply();
   [[nodiscard]] std::vector<FieldSpec> listed() const;
   /// The options of the command as mdoc list items.
   [[nodiscard]] std::string manual() const;

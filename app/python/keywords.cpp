@@ -2,7 +2,9 @@
 #include "app/python/keywords.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
+#include <variant>
 
 #include "core/schema/option_text.h"
 
@@ -28,7 +30,7 @@ std::string text_word(py::handle value) {
   return py::module_::import("os").attr("fspath")(value).cast<std::string>();
 }
 
-/// "1.5,2": several numbers are one text.
+/// "1.5,2": several numbers are one text; empty if one of them is none.
 std::string list_word(py::handle values) {
   std::string text;
   for (const py::handle value : values) {
@@ -39,30 +41,49 @@ std::string list_word(py::handle values) {
   return text;
 }
 
-/// A value as a word of the command line; empty if it is none of the option's kind.
-std::string word_of(const FieldSpec& spec, py::handle value) {
-  switch (spec.kind) {
-    case FieldKind::kWhole:
-      return is_whole(value) ? number_word(value) : "";
-    case FieldKind::kNumber:
-      return is_number(value) ? number_word(value) : "";
-    case FieldKind::kLength:
-      if (is_number(value)) return number_word(value);
-      break;
-    case FieldKind::kText:
-      if (!is_text(value) && py::isinstance<py::sequence>(value)) return list_word(value);
-      break;
-    default:
-      break;
+/// A whole number beyond the range of doubles is infinite: it breaks every option's limits.
+double number_of(py::handle value) {
+  const double number = PyFloat_AsDouble(value.ptr());
+  if (PyErr_Occurred() == nullptr) return number;
+  if (PyErr_ExceptionMatches(PyExc_OverflowError) == 0) throw py::error_already_set();
+  PyErr_Clear();
+  return std::numeric_limits<double>::infinity();
+}
+
+FieldValue number_value(const FieldSpec& spec, py::handle value) {
+  const double number = number_of(value);
+  spec.require(number_word(value), number);
+  return spec.kind == FieldKind::kWhole ? FieldValue(static_cast<int>(number)) : number;
+}
+
+/// The text of a word, length or text; empty if it is none.
+std::string text_of(const FieldSpec& spec, py::handle value) {
+  if (is_text(value)) return spec.kind == FieldKind::kNumber ? "" : text_word(value);
+  const bool list = spec.kind == FieldKind::kText && py::isinstance<py::sequence>(value);
+  return list ? list_word(value) : "";
+}
+
+/// A value as its option's type; none if it is of another. @throw InputError naming option, value
+/// and rule.
+FieldValue value_from(const FieldSpec& spec, py::handle value) {
+  if (spec.kind == FieldKind::kFlag) {
+    return is_bool(value) ? FieldValue(value.cast<bool>()) : FieldValue();
   }
-  return is_text(value) ? text_word(value) : "";
+  if (spec.kind == FieldKind::kWhole) {
+    return is_whole(value) ? number_value(spec, value) : FieldValue();
+  }
+  if (spec.is_number() && is_number(value)) return number_value(spec, value);
+  const std::string text = text_of(spec, value);
+  return text.empty() ? FieldValue() : value_of(spec, text);
 }
 
 }  // namespace
 
-Keywords::Keywords(std::string function, app::OptionSet& options,
+Keywords::Keywords(std::string function, const Description& fields,
                    const std::set<std::string>& withheld)
     : function_(std::move(function)) {
+  app::OptionSet options(function_, "");
+  options.add(fields);
   try {
     options.parse({app::kListOptions});
   } catch (const app::ListedOptions& listed) {
@@ -86,25 +107,21 @@ const FieldSpec& Keywords::spec_of(const std::string& keyword) const {
   return *found;
 }
 
-app::Arguments Keywords::words(const py::kwargs& given) const {
-  app::Arguments words;
+app::OptionValues Keywords::values(const py::kwargs& given) const {
+  app::OptionValues values;
   for (const auto& [key, value] : given) {
     const auto keyword = key.cast<std::string>();
-    const FieldSpec& spec = spec_of(keyword);
-    if (spec.kind == FieldKind::kFlag && is_bool(value)) {
-      if (value.cast<bool>()) words.push_back(spec.name);
-      continue;
-    }
-    const std::string word = word_of(spec, value);
-    if (spec.kind == FieldKind::kFlag || word.empty()) {
+    FieldSpec spec = spec_of(keyword);
+    const std::string option = std::exchange(spec.name, keyword);
+    const FieldValue taken = value_from(spec, value);
+    if (std::holds_alternative<std::monostate>(taken)) {
       throw py::type_error(function_ + "(): " + keyword + "=" +
                            py::repr(value).cast<std::string>() + ": must be " + python_type(spec));
     }
-    words.push_back(spec.name);
-    words.back() += "=";
-    words.back() += word;
+    // A flag that is off counts as not given.
+    if (taken != FieldValue(false)) values[option] = taken;
   }
-  return words;
+  return values;
 }
 
 std::string Keywords::text() const {

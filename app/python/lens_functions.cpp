@@ -139,7 +139,7 @@ void add_lens(py::module_& module) {
       "model", [](const LensObject& self) { return model_name(self.lens().model); },
       "str: the surface model that it was designed with.");
   type.def_property_readonly(
-      "metrics", [](const LensObject& self) { return object_from(app::metrics_json(self.lens())); },
+      "metrics", [](const LensObject& self) { return object_from(metrics_json(self.lens())); },
       "dict: for every surface model how close its picture is to the target.");
   type.def_property_readonly(
       "provenance",
@@ -162,15 +162,10 @@ namespace {
 // The commands as functions: the same options, the same library call; what a command prints is
 // returned.
 
-/// Command-line placeholder for a function's own argument.
+/// A function's own argument in messages and in a lens's provenance.
 constexpr const char* kArgument = "picture";
 
 RunControl stopping_at(const std::stop_token& stop) { return {stop, {}}; }
-
-app::Arguments with(app::Arguments words, const app::Arguments& more) {
-  words.insert(words.end(), more.begin(), more.end());
-  return words;
-}
 
 // --- design
 
@@ -185,11 +180,12 @@ py::array array_from(const py::object& picture) {
   return array;
 }
 
-py::object design(const py::object& picture, const app::Arguments& words) {
+py::object design(const py::object& picture, app::OptionValues values) {
   app::DesignSettings settings;
   app::OptionSet options("design", "");
-  app::add_design_options(options, settings);
-  options.parse(with({kArgument, "--out=."}, words));
+  options.fields(settings);
+  values.insert({{"TARGET", kArgument}, {"--out", "."}});
+  options.take(values);
   const Image given = is_path(picture) ? Image() : image_from(array_from(picture), kArgument);
   settings.target = is_path(picture) ? picture.cast<fs::path>().string() : kArgument;
   auto made = std::make_shared<LensObject>();
@@ -210,8 +206,8 @@ py::object design(const py::object& picture, const app::Arguments& words) {
 // --- render
 
 /// Render options for a lens in one colour.
-void add_render_options(app::OptionSet& options, RenderOptions& render) {
-  options.add(description_of(render).except({"--wavelengths", "--abbe"}));
+Description options_of(RenderOptions& render) {
+  return description_of(render).except({"--wavelengths", "--abbe"});
 }
 
 /// The picture that a lens projects, in its target's light.
@@ -229,15 +225,15 @@ Image picture_of(const Lens& lens, const RenderOptions& render, const Executor& 
   return image;
 }
 
-py::array render(const py::object& source, const app::Arguments& words) {
+py::array render(const py::object& source, const app::OptionValues& values) {
   const py::object kept = lens_from(source);
   const Lens& lens = kept.cast<const LensObject&>().lens();
   RenderOptions chosen{.model = lens.model, .setup = lens.setup};
   app::OptionSet options("render", "");
-  add_render_options(options, chosen);
-  options.parse(words);
+  options.add(options_of(chosen));
+  options.take(values);
   if (chosen.model == SurfaceModel::kSpline && !lens.spline) {
-    throw InputError("--model spline: must be facet or smooth: the lens is no spline");
+    throw InputError("model spline: must be facet or smooth: the lens is no spline");
   }
   Image image = run_released([&](const std::stop_token& stop) {
     require_wall_above(lens.surface, chosen.setup);
@@ -248,11 +244,11 @@ py::array render(const py::object& source, const app::Arguments& words) {
 
 // --- cam
 
-py::object cam(const py::object& lens, const app::Arguments& words) {
+py::object cam(const py::object& lens, const app::OptionValues& values) {
   app::CamSettings settings;
   app::OptionSet options("cam", "");
-  app::add_cam_options(options, settings);
-  options.parse(with({kArgument}, words));
+  options.fields(settings);
+  options.take(values);
   settings.source = folder_of(lens).string();
   const CamResult result = run_released([&](const std::stop_token& stop) {
     const FolderLock reading(settings.source, FolderLock::Kind::kShared);
@@ -275,11 +271,12 @@ py::object cam(const py::object& lens, const app::Arguments& words) {
 
 // --- export
 
-py::object export_file(const py::object& lens, const fs::path& out, const app::Arguments& words) {
+py::object export_file(const py::object& lens, const fs::path& out,
+                       const app::OptionValues& values) {
   app::ExportSettings settings;
   app::OptionSet options("export", "");
-  app::add_export_options(options, settings);
-  options.parse(with({kArgument, "--out=."}, words));
+  options.fields(settings);
+  options.take(values);
   const fs::path folder = folder_of(lens);
   const ExportResult result = run_released([&](const std::stop_token& stop) {
     app::require_fitting_options(options, export_format(settings.options, out));
@@ -298,12 +295,12 @@ py::object export_file(const py::object& lens, const fs::path& out, const app::A
 }  // namespace
 
 void add_commands(py::module_& module) {
-  const Keywords of_design =
-      Keywords::of("design", app::add_design_options, {"--out", "--live", "--resume", "--force"});
+  const Keywords of_design("design", description_of(app::DesignSettings()),
+                           {"--out", "--live", "--resume", "--force"});
   module.def(
       "design",
       [of_design](const py::object& picture, const py::kwargs& options) {
-        return design(picture, of_design.words(options));
+        return design(picture, of_design.values(options));
       },
       py::arg("picture"),
       ("design(picture, **options) -> Lens: shapes a lens that projects a picture.\n\n"
@@ -311,11 +308,12 @@ void add_commands(py::module_& module) {
        "Raises InputError, RunError. The options are those of lensforge design:\n" +
        of_design.text())
           .c_str());
-  const Keywords of_render = Keywords::of("render", add_render_options, {});
+  RenderOptions usual;
+  const Keywords of_render("render", options_of(usual), {});
   module.def(
       "render",
       [of_render](const py::object& lens, const py::kwargs& options) {
-        return render(lens, of_render.words(options));
+        return render(lens, of_render.values(options));
       },
       py::arg("lens"),
       ("render(lens, **options): what a Lens, or the one in a folder, projects.\n\n"
@@ -323,12 +321,12 @@ void add_commands(py::module_& module) {
        "lensforge render:\n" +
        of_render.text())
           .c_str());
-  const Keywords of_cam =
-      Keywords::of("cam", app::add_cam_options, {"--show-workshop", "--compare", "--device"});
+  const Keywords of_cam("cam", description_of(app::CamSettings()),
+                        {"--show-workshop", "--compare", "--device"});
   module.def(
       "cam",
       [of_cam](const py::object& lens, const py::kwargs& options) {
-        return cam(lens, of_cam.words(options));
+        return cam(lens, of_cam.values(options));
       },
       py::arg("lens"),
       ("cam(lens, **options) -> dict: programs, milled surface and report, in the lens folder's\n"
@@ -336,11 +334,11 @@ void add_commands(py::module_& module) {
        "\"report\", as report.json has it. The options are those of lensforge cam:\n" +
        of_cam.text())
           .c_str());
-  const Keywords of_export = Keywords::of("export", app::add_export_options, {"--out"});
+  const Keywords of_export("export", description_of(app::ExportSettings()), {"--out"});
   module.def(
       "export",
       [of_export](const py::object& lens, const fs::path& out, const py::kwargs& options) {
-        return export_file(lens, out, of_export.words(options));
+        return export_file(lens, out, of_export.values(options));
       },
       py::arg("lens"), py::arg("out"),
       ("export(lens, out, **options) -> dict: writes a solid, mesh or height map.\n\n"

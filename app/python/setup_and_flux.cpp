@@ -23,10 +23,11 @@ namespace lensforge::python {
 namespace {
 
 /// The options of a design that say how its lens is lit and seen.
-void add_options(app::OptionSet& options, DesignOptions& design) {
-  options.add(
-      description_of(design).only({"--width", "--focal", "--ior", "--thickness", "--view"}));
-  options.fields(design.light);
+Description options_of(DesignOptions& design) {
+  Description options =
+      description_of(design).only({"--width", "--focal", "--ior", "--thickness", "--view"});
+  describe(options, design.light);
+  return options;
 }
 
 /// @throw InputError naming the side.
@@ -36,13 +37,13 @@ void require_side(const char* name, int pixels) {
                    Limits::between(kMinPixels, kMaxImageSide).rule());
 }
 
-OpticalSetup make_setup(int columns, int rows, const app::Arguments& words) {
+OpticalSetup make_setup(int columns, int rows, const app::OptionValues& values) {
   require_side("columns", columns);
   require_side("rows", rows);
   DesignOptions design;
   app::OptionSet options("Setup", "");
-  add_options(options, design);
-  options.parse(words);
+  options.add(options_of(design));
+  options.take(values);
   design.pixels = std::max(columns, rows);
   validate(design, Image(columns, rows, 1.0F));
   return optical_setup(design, {columns, rows});
@@ -53,7 +54,8 @@ py::tuple pair_of(const Eigen::Vector2d& size) { return py::make_tuple(size.x(),
 }  // namespace
 
 void add_setup(py::module_& module) {
-  const Keywords keywords = Keywords::of("Setup", add_options, {"--threads", "--device"});
+  DesignOptions usual;
+  const Keywords keywords("Setup", options_of(usual), {"--threads", "--device"});
   py::class_<OpticalSetup> type(
       module, "Setup",
       "Everything between the lamp and the wall but the surface. It does not change.");
@@ -62,7 +64,7 @@ void add_setup(py::module_& module) {
       "The options are those of lensforge design:\n" +
       keywords.text();
   type.def(py::init([keywords](int columns, int rows, const py::kwargs& given) {
-             return make_setup(columns, rows, keywords.words(given));
+             return make_setup(columns, rows, keywords.values(given));
            }),
            py::arg("columns"), py::arg("rows"), text.c_str());
   type.def_property_readonly(

@@ -8,6 +8,7 @@
 #include "cam/report/verdict.h"
 #include "cam/tolerance/part_error.h"
 #include "core/io/lens_folder.h"
+#include "core/schema/json.h"
 #include "core/text/version.h"
 
 namespace lensforge {
@@ -40,16 +41,13 @@ json check_json(const LimitCheck& check) {
 
 json quality_json(const RenderedSurface& surface) {
   const PictureQuality& q = surface.quality;
-  return {{"name", surface.name},
-          {"mae", q.metrics.mae},
-          {"psnr", number(q.metrics.psnr)},
-          {"ssim", q.metrics.ssim},
-          {"mae_linear", q.metrics.mae_linear},
-          {"flux_inside", q.metrics.flux_inside},
-          {"leakage", q.leakage},
-          {"dark_flux", q.dark_flux},
-          {"dark_over_bright", q.dark_ratio},
-          {"contrast", number(q.contrast())}};
+  json object = json_of(description_of(q.metrics));
+  object.update({{"name", surface.name},
+                 {"leakage", q.leakage},
+                 {"dark_flux", q.dark_flux},
+                 {"dark_over_bright", q.dark_ratio},
+                 {"contrast", number(q.contrast())}});
+  return object;
 }
 
 json cause_json(const CausePart& part) {

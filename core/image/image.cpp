@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/image/transfer.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -194,6 +195,15 @@ double mean_linear_error(const Image& render, const Image& target) {
 }
 
 }  // namespace
+
+void describe(Description& d, ImageMetrics& metrics) {
+  d.number("mae", metrics.mae, {}, "", "").needed = true;
+  Field& psnr = d.number("psnr", metrics.psnr, {}, "", "");
+  psnr.needed = psnr.infinite_if_null = true;
+  d.number("ssim", metrics.ssim, {}, "", "").needed = true;
+  d.number("flux_inside", metrics.flux_inside, {}, "", "").needed = true;
+  d.number("mae_linear", metrics.mae_linear, {}, "", "");
+}
 
 ImageMetrics compare(const Image& render, const Image& target) {
   check_equal_sizes(render, target);

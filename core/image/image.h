@@ -11,6 +11,8 @@
 
 namespace lensforge {
 
+class Description;
+
 /// A grey picture in linear light, row 0 on top. 1 is display white; flux is proportional to it.
 class Image {
  public:
@@ -93,6 +95,8 @@ struct ImageMetrics {
   double mae_linear = 0.0;   ///< Mean absolute error of linear flux ÷ largest target flux.
   double flux_inside = 1.0;  ///< Share of the flux that lands on the image rectangle.
 };
+
+void describe(Description& d, ImageMetrics& metrics);
 
 /// Compares `render` with `target`, both linear light relative to the same white. Sets all but
 /// flux_inside. @pre equal sizes.

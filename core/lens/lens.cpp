@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/lens/lens.h"
 
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -43,29 +41,6 @@ constexpr std::uintmax_t kMaxJsonBytes = std::uintmax_t{1} << 20U;
 
 std::string size_text(int columns, int rows) {
   return std::to_string(columns) + " x " + std::to_string(rows);
-}
-
-ordered_json to_json(const ImageMetrics& metrics) {
-  // JSON knows no infinity: the PSNR of equal pictures is stored as null.
-  const ordered_json psnr =
-      std::isfinite(metrics.psnr) ? ordered_json(metrics.psnr) : ordered_json(nullptr);
-  return {{"mae", metrics.mae},
-          {"psnr", psnr},
-          {"ssim", metrics.ssim},
-          {"flux_inside", metrics.flux_inside},
-          {"mae_linear", metrics.mae_linear}};
-}
-
-ordered_json to_json(const ModelMetrics& metrics) {
-  ordered_json by_model;
-  for (const auto& [model, one] : metrics) by_model[model_name(model)] = to_json(one);
-  return by_model;
-}
-
-ordered_json metrics_json(const Lens& lens) {
-  ordered_json by_model = to_json(lens.metrics);
-  if (lens.source_limit) by_model[kSourceLimit] = to_json(*lens.source_limit);
-  return by_model;
 }
 
 ordered_json to_json(const Lens& lens) {
@@ -177,12 +152,7 @@ OpticalSetup read_setup(const JsonFields& fields, const fs::path& folder, const 
 
 ImageMetrics read_metrics(const JsonFields& fields) {
   ImageMetrics metrics;
-  metrics.mae = fields.number("mae");
-  metrics.psnr =
-      fields.at("psnr").is_null() ? std::numeric_limits<double>::infinity() : fields.number("psnr");
-  metrics.ssim = fields.number("ssim");
-  metrics.flux_inside = fields.number("flux_inside");
-  if (fields.has("mae_linear")) metrics.mae_linear = fields.number("mae_linear");
+  read_json(description_of(metrics), fields);
   return metrics;
 }
 
@@ -277,6 +247,20 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
 }
 
 }  // namespace
+
+ordered_json metrics_json(const ImageMetrics& metrics) { return json_of(description_of(metrics)); }
+
+ordered_json metrics_json(const ModelMetrics& metrics) {
+  ordered_json by_model;
+  for (const auto& [model, one] : metrics) by_model[model_name(model)] = metrics_json(one);
+  return by_model;
+}
+
+ordered_json metrics_json(const Lens& lens) {
+  ordered_json by_model = metrics_json(lens.metrics);
+  if (lens.source_limit) by_model[kSourceLimit] = metrics_json(*lens.source_limit);
+  return by_model;
+}
 
 Provenance::Provenance() : Provenance(json::object()) {}
 

@@ -22,6 +22,11 @@ class PendingFiles;
 /// Metrics of a surface's picture under each model, against the target.
 using ModelMetrics = std::map<SurfaceModel, ImageMetrics>;
 
+/// Metrics as lens.json has them; psnr is null where it is infinite.
+nlohmann::ordered_json metrics_json(const ImageMetrics& metrics);
+/// An object with the metrics of every model.
+nlohmann::ordered_json metrics_json(const ModelMetrics& metrics);
+
 /// The origin of a lens: a JSON object with program, options, time and result.
 class Provenance {
  public:
@@ -50,6 +55,9 @@ struct Lens {
   std::optional<ImageMetrics> source_limit;
   Provenance provenance;
 };
+
+/// The lens's metrics by model, with "source_limit" if its source has an extent.
+nlohmann::ordered_json metrics_json(const Lens& lens);
 
 /// The models under which a lens's surface can be evaluated; a spline's nodes also form a mesh.
 std::vector<SurfaceModel> models_of(const Lens& lens);

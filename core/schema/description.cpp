@@ -2,6 +2,7 @@
 #include "core/schema/description.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/text/number_text.h"
@@ -16,6 +17,7 @@ bool Limits::hold(double value) const {
 
 std::string Limits::rule() const {
   const std::string zero = or_zero ? "0, or " : "";
+  if (std::isinf(high)) return zero + number_text(low) + " or more";
   return low_excluded ? zero + "above " + number_text(low) + ", at most " + number_text(high)
                       : zero + number_text(low) + " to " + number_text(high);
 }

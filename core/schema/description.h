@@ -37,7 +37,7 @@ struct Limits {
 
   /// True if the value is in the range; false for NaN.
   [[nodiscard]] bool hold(double value) const;
-  /// "0.25 to 8", "above 0, at most 9", "0, or 4 to 6". @pre both are finite.
+  /// "0.25 to 8", "above 0, at most 9", "0, or 4 to 6", "0 or more".
   [[nodiscard]] std::string rule() const;
 };
 
@@ -71,6 +71,7 @@ struct FieldSpec {
   std::size_t count = 0;                ///< Of several numbers; 0: any.
   bool needed = false;                  ///< Must be given.
   bool zero_if_missing = false;         ///< Also allows 0 or an empty list, which files leave out.
+  bool infinite_if_null = false;        ///< Numbers that are not finite are null in JSON.
   std::string left_out = {};            ///< Why a fingerprint omits it; empty if it does not.
 
   [[nodiscard]] bool is_number() const {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -173,6 +174,32 @@ json json_of(const FieldValue& value) {
       value);
 }
 
+namespace {
+
+/// A field's value; null for a number that it stands for.
+json stored(const Field& field) {
+  const FieldValue value = field.get();
+  if (field.infinite_if_null && !std::isfinite(number_of(value))) return nullptr;
+  return json_of(value);
+}
+
+/// @throw json::exception unless the value is of the kind.
+FieldValue value_as(FieldKind kind, const json& value) {
+  switch (kind) {
+    case FieldKind::kFlag:
+      return value.get<bool>();
+    case FieldKind::kWhole:
+      return value.get<int>();
+    case FieldKind::kNumber:
+    case FieldKind::kLength:
+      return value.get<double>();
+    default:
+      return value.get<std::string>();
+  }
+}
+
+}  // namespace
+
 ordered_json json_of(const Description& description) {
   ordered_json object = ordered_json::object();
   for (const Field& field : description) {
@@ -184,10 +211,21 @@ ordered_json json_of(const Description& description) {
     } else if (const FieldValue value = field.get();
                !field.zero_if_missing ||
                (value != FieldValue(0.0) && value != FieldValue(std::vector<double>()))) {
-      object[field.name] = json_of(value);
+      object[field.name] = stored(field);
     }
   }
   return object;
+}
+
+json row_of(const Description& description) {
+  json row = json::array();
+  for (const Field& field : description) row.push_back(stored(field));
+  return row;
+}
+
+void read_row(const Description& description, const json& row) {
+  std::size_t column = 0;
+  for (const Field& field : description) field.set(value_as(field.kind, row.at(column++)));
 }
 
 void append_fingerprint(const Description& description, json& array) {
@@ -202,7 +240,10 @@ FieldValue value_in(const JsonFields& fields, const Field& field) {
   const std::string& name = field.name;
   if (field.kind == FieldKind::kFlag) return fields.flag(name);
   if (field.kind == FieldKind::kWhole) return fields.integer(name);
-  if (field.is_number()) return fields.number(name);
+  if (field.is_number()) {
+    const bool infinite = field.infinite_if_null && fields.at(name).is_null();
+    return infinite ? std::numeric_limits<double>::infinity() : fields.number(name);
+  }
   if (field.kind == FieldKind::kNumbers) return fields.numbers(name, field.count);
   const std::string text = fields.text(name);
   if (field.kind == FieldKind::kText) return text;

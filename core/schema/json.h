@@ -60,7 +60,7 @@ class JsonFields {
 };
 
 /// A described object, its fields in the description's order. Numbers and lists that a missing
-/// field stands for are left out.
+/// field stands for are left out; numbers that null stands for are null.
 nlohmann::ordered_json json_of(const Description& description);
 
 /// Reads it back: a field that is not needed keeps its value if it is missing. @throw InputError
@@ -76,6 +76,13 @@ Value word_in(const JsonFields& fields, const std::string& name, const Choices<V
   read_json(description, fields);
   return value;
 }
+
+/// The values of an object's fields as an array, for a row of a table.
+nlohmann::json row_of(const Description& description);
+
+/// Reads such an array back; its values are not checked against limits. @throw json::exception if
+/// one is missing or of another type.
+void read_row(const Description& description, const nlohmann::json& row);
 
 /// Appends the values that a fingerprint holds to an array.
 void append_fingerprint(const Description& description, nlohmann::json& array);

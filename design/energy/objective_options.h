@@ -15,6 +15,8 @@
 
 namespace lensforge {
 
+class Description;
+
 /// Weights of the objective (Sun et al., Eqs. 17, 18 and 20). All ≥ 0; the values are those of
 /// their Appendix E, with two exceptions.
 /// - λ2 (paper: 1e3). E_grad weighs the finest detail of the picture's error up to 81 times as much
@@ -131,6 +133,8 @@ struct ConvergenceRow {
   double mae = 0.0;
   double seconds = 0.0;  ///< Since the start of the design, without interruptions.
 };
+
+void describe(Description& d, ConvergenceRow& row);
 
 /// The text of convergence.csv: a header and one line per row.
 std::string convergence_csv(const std::vector<ConvergenceRow>& rows);

@@ -403,37 +403,6 @@ auto entries(const Matrix& matrix) {
   return std::span<const Scalar>(matrix.data(), static_cast<std::size_t>(matrix.size()));
 }
 
-json to_json(const ReflectUpdate& row) {
-  return {row.number,           row.stage,  row.energy, row.mean_displacement,
-          row.max_displacement, row.seconds};
-}
-
-ReflectUpdate update_from_json(const json& j) {
-  return {j.at(0), j.at(1), j.at(2), j.at(3), j.at(4), j.at(5)};
-}
-
-void require(bool holds, const JsonFields& fields, const char* name, const char* rule) {
-  if (!holds) fields.refuse(name, rule);
-}
-
-ReflectCheckpoint from_header(const json& header, const JsonFields& fields) {
-  ReflectCheckpoint checkpoint;
-  checkpoint.fingerprint = header.at("fingerprint");
-  checkpoint.stage = fields.integer("stage");
-  checkpoint.first = fields.integer("first");
-  checkpoint.split = header.at("split").get<std::vector<int>>();
-  checkpoint.before = {fields.number("direct"), fields.number("total")};
-  checkpoint.seconds = fields.number("seconds");
-  for (const json& row : header.at("updates")) {
-    checkpoint.updates.push_back(update_from_json(row));
-  }
-  require(checkpoint.stage >= 0 && checkpoint.stage < kStages, fields, "stage",
-          "it must be 0 to 2");
-  require(checkpoint.first >= 0 && checkpoint.first <= static_cast<int>(checkpoint.updates.size()),
-          fields, "first", "it must be 0 to the number of updates");
-  return checkpoint;
-}
-
 /// Takes a matrix of three rows from the front of the numbers.
 Eigen::Matrix3Xd taken(std::string_view& numbers, int columns, const std::filesystem::path& path) {
   constexpr std::size_t kBytes = 3 * sizeof(double);
@@ -450,6 +419,23 @@ Eigen::Matrix3Xd taken(std::string_view& numbers, int columns, const std::filesy
 
 }  // namespace
 
+void describe(Description& d, ReflectUpdate& update) {
+  d.whole("update", update.number, {}, "");
+  d.text("stage", update.stage, "", "");
+  d.number("energy", update.energy, {}, "", "");
+  d.number("mean_displacement", update.mean_displacement, {}, "", "");
+  d.number("max_displacement", update.max_displacement, {}, "", "");
+  d.number("seconds", update.seconds, {}, "", "");
+}
+
+void describe(Description& d, ReflectCheckpoint& checkpoint) {
+  d.whole("stage", checkpoint.stage, Limits::between(0, kStages - 1), "").needed = true;
+  d.whole("first", checkpoint.first, {}, "").needed = true;
+  d.number("direct", checkpoint.before.direct, {}, "", "").needed = true;
+  d.number("total", checkpoint.before.total, {}, "", "").needed = true;
+  d.number("seconds", checkpoint.seconds, {}, "", "").needed = true;
+}
+
 std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOptions& options) {
   json description = {input.fixed, input.planar, input.partner};
   append_fingerprint(description_of(options), description);
@@ -462,17 +448,13 @@ std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOption
 
 void write_checkpoint(const ReflectCheckpoint& checkpoint, const std::filesystem::path& path) {
   json rows = json::array();
-  for (const ReflectUpdate& row : checkpoint.updates) rows.push_back(to_json(row));
-  const json header = {{"fingerprint", checkpoint.fingerprint},
-                       {"stage", checkpoint.stage},
-                       {"first", checkpoint.first},
-                       {"split", checkpoint.split},
-                       {"direct", checkpoint.before.direct},
-                       {"total", checkpoint.before.total},
-                       {"updates", rows},
-                       {"seconds", checkpoint.seconds},
-                       {"vertices", checkpoint.vertices.cols()},
-                       {"faces", checkpoint.unmet.cols()}};
+  for (const ReflectUpdate& row : checkpoint.updates) rows.push_back(row_of(description_of(row)));
+  json header = json_of(description_of(checkpoint));
+  header.update({{"fingerprint", checkpoint.fingerprint},
+                 {"split", checkpoint.split},
+                 {"updates", rows},
+                 {"vertices", checkpoint.vertices.cols()},
+                 {"faces", checkpoint.unmet.cols()}});
   std::string numbers(bytes_of(entries(checkpoint.vertices)));
   numbers += bytes_of(entries(checkpoint.unmet));
   write_checkpoint_file(path, kMagic, {header, numbers});
@@ -483,7 +465,16 @@ ReflectCheckpoint read_checkpoint(const std::filesystem::path& path,
   const CheckpointContent content = read_checkpoint_file(path, kMagic);
   try {
     const JsonFields fields(content.header, checkpoint_header_name(path));
-    ReflectCheckpoint checkpoint = from_header(content.header, fields);
+    ReflectCheckpoint checkpoint;
+    read_json(description_of(checkpoint), fields);
+    checkpoint.fingerprint = content.header.at("fingerprint");
+    checkpoint.split = content.header.at("split").get<std::vector<int>>();
+    for (const json& row : content.header.at("updates")) {
+      read_row(description_of(checkpoint.updates.emplace_back()), row);
+    }
+    if (checkpoint.first < 0 || checkpoint.first > static_cast<int>(checkpoint.updates.size())) {
+      fields.refuse("first", "it must be 0 to the number of updates");
+    }
     if (fingerprint && checkpoint.fingerprint != *fingerprint) {
       refuse_checkpoint(path,
                         "is of another mesh or other options: run the command that began it, or "

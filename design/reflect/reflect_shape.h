@@ -24,6 +24,8 @@ struct ReflectUpdate {
   double seconds = 0.0;  ///< Since the start of the run.
 };
 
+void describe(Description& d, ReflectUpdate& update);
+
 /// Cross-sections around the horizon of the original mesh and of the new shape, m²; the meshes are
 /// in millimetres.
 struct RadarComparison {
@@ -82,6 +84,9 @@ struct ReflectCheckpoint {
   Eigen::Matrix3Xd vertices;  ///< In the unit frame, 3 × V.
   Eigen::Matrix3Xd unmet;     ///< UnmetTurns::sum(), 3 × F.
 };
+
+/// Describes the plain values of a checkpoint's header.
+void describe(Description& d, ReflectCheckpoint& checkpoint);
 
 /// Returns a number that differs for other meshes and for other options that change the shape.
 std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOptions& options);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/checkpoint.h"
 
-#include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
@@ -10,11 +9,14 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "core/io/checkpoint_file.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/schema/json.h"
 #include "core/spline/control_net.h"
+#include "core/text/words.h"
 #include "design/setup/option_tables.h"
 
 // After the header come the vertices and, if the header has scales, the reach of their steps, as
@@ -54,30 +56,34 @@ void append_outline(const Outline& outline, json& description) {
   description.push_back({static_cast<int>(outline.kind), outline.radius, points});
 }
 
-json to_json(const ConvergenceRow& row) {
-  const EnergyValues& e = row.energy;
-  return {row.stage,  row.level,  row.round, row.iteration,  e.image, e.unlit,
-          e.gradient, e.boundary, e.barrier, e.face,         e.edge,  e.laplacian,
-          e.align,    e.flux,     e.total,   row.mass_error, row.mae, row.seconds};
-}
-
-ConvergenceRow row_from_json(const json& j) {
-  ConvergenceRow row;
-  row.stage = j.at(0);
-  row.level = j.at(1);
-  row.round = j.at(2);
-  row.iteration = j.at(3);
-  EnergyValues& e = row.energy;
-  int next = 4;
-  for (double* value :
-       {&e.image, &e.unlit, &e.gradient, &e.boundary, &e.barrier, &e.face, &e.edge, &e.laplacian,
-        &e.align, &e.flux, &e.total, &row.mass_error, &row.mae, &row.seconds}) {
-    *value = j.at(static_cast<std::size_t>(next++));
-  }
-  return row;
-}
-
 }  // namespace
+
+/// The columns of convergence.csv and of a checkpoint's rows.
+void describe(Description& d, ConvergenceRow& row) {
+  d.text("stage", row.stage, "", "");
+  d.whole("level", row.level, {}, "");
+  d.whole("round", row.round, {}, "");
+  d.whole("iteration", row.iteration, {}, "");
+  EnergyValues& e = row.energy;
+  const std::pair<const char*, double*> numbers[] = {
+      {"image", &e.image},       {"unlit", &e.unlit},         {"gradient", &e.gradient},
+      {"boundary", &e.boundary}, {"barrier", &e.barrier},     {"face", &e.face},
+      {"edge", &e.edge},         {"laplacian", &e.laplacian}, {"align", &e.align},
+      {"flux", &e.flux},         {"total", &e.total},         {"mass_error", &row.mass_error},
+      {"mae", &row.mae},         {"seconds", &row.seconds}};
+  for (const auto& [name, value] : numbers) d.number(name, *value, {}, "", "");
+}
+
+void describe(Description& d, Checkpoint& checkpoint) {
+  d.whole("level", checkpoint.level, {.low = 0}, "").needed = true;
+  d.whole("round", checkpoint.round, {.low = 0}, "").needed = true;
+  Field& value = d.number("value", checkpoint.value, {}, "", "");
+  value.needed = value.infinite_if_null = true;
+  d.flag("transporting", checkpoint.transporting, "").needed = true;
+  d.number("seconds", checkpoint.seconds, {}, "", "").needed = true;
+  d.whole("columns", checkpoint.mesh.grid.columns, {}, "").needed = true;
+  d.whole("rows", checkpoint.mesh.grid.rows, {}, "").needed = true;
+}
 
 std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options) {
   json weights = json::array();
@@ -100,20 +106,18 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
 }
 
 void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path& path) {
+  ConvergenceRow row;
+  const Description columns = description_of(row);
   json rows = json::array();
-  for (const ConvergenceRow& row : checkpoint.convergence) rows.push_back(to_json(row));
+  for (const ConvergenceRow& each : checkpoint.convergence) {
+    row = each;
+    rows.push_back(row_of(columns));
+  }
   const StepScales& steps = checkpoint.scales;
-  const json scales = steps.known() ? json{steps.xy, steps.z} : json();
-  const json header = {{"fingerprint", checkpoint.fingerprint},
-                       {"level", checkpoint.level},
-                       {"round", checkpoint.round},
-                       {"value", std::isfinite(checkpoint.value) ? json(checkpoint.value) : json()},
-                       {"transporting", checkpoint.transporting},
-                       {"seconds", checkpoint.seconds},
-                       {"columns", checkpoint.mesh.grid.columns},
-                       {"rows", checkpoint.mesh.grid.rows},
-                       {"scales", scales},
-                       {"convergence", rows}};
+  json header = json_of(description_of(checkpoint));
+  header.update({{"fingerprint", checkpoint.fingerprint},
+                 {"scales", steps.known() ? json{steps.xy, steps.z} : json()},
+                 {"convergence", rows}});
   std::string numbers(bytes_of(entries(checkpoint.mesh.vertices)));
   numbers += bytes_of(entries(steps.reach));
   write_checkpoint_file(path, kMagic, {header, numbers});
@@ -123,20 +127,12 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   const CheckpointContent parts = read_checkpoint_file(path, kMagic);
   try {
     Checkpoint checkpoint;
+    read_json(description_of(checkpoint), {parts.header, checkpoint_header_name(path)});
     checkpoint.fingerprint = parts.header.at("fingerprint");
-    const JsonFields fields(parts.header, checkpoint_header_name(path));
-    checkpoint.level = fields.integer("level");
-    checkpoint.round = fields.integer("round");
-    if (checkpoint.level < 0) fields.refuse("level", "it must be 0 or more");
-    if (checkpoint.round < 0) fields.refuse("round", "it must be 0 or more");
-    const json& value = parts.header.at("value");
-    if (!value.is_null()) checkpoint.value = value;
-    checkpoint.transporting = parts.header.at("transporting");
-    checkpoint.seconds = parts.header.at("seconds");
     for (const json& row : parts.header.at("convergence")) {
-      checkpoint.convergence.push_back(row_from_json(row));
+      read_row(description_of(checkpoint.convergence.emplace_back()), row);
     }
-    const GridShape shape{fields.integer("columns"), fields.integer("rows")};
+    const GridShape shape = checkpoint.mesh.grid;
     const json& scales = parts.header.at("scales");
     const std::size_t bytes = parts.numbers.size() / (scales.is_null() ? 1 : 2);
     const std::size_t count = bytes / (3 * sizeof(double));
@@ -245,16 +241,16 @@ void DesignLog::report_done() const {
 std::string convergence_csv(const std::vector<ConvergenceRow>& rows) {
   std::ostringstream out;
   out.precision(9);
-  out << "stage,level,round,iteration,image,unlit,gradient,boundary,barrier,face,edge,laplacian,"
-         "align,"
-         "flux,total,mass_error,mae,seconds\n";
-  for (const ConvergenceRow& r : rows) {
-    const EnergyValues& e = r.energy;
-    out << r.stage << ',' << r.level << ',' << r.round << ',' << r.iteration;
-    for (const double value :
-         {e.image, e.unlit, e.gradient, e.boundary, e.barrier, e.face, e.edge, e.laplacian, e.align,
-          e.flux, e.total, r.mass_error, r.mae, r.seconds}) {
-      out << ',' << value;
+  ConvergenceRow row;
+  const Description columns = description_of(row);
+  std::vector<std::string> names;
+  for (const Field& column : columns) names.push_back(column.name);
+  out << joined(names, ",") << '\n';
+  for (const ConvergenceRow& each : rows) {
+    row = each;
+    out << row.stage;
+    for (const Field& column : columns) {
+      if (column.is_number()) out << ',' << number_of(column.get());
     }
     out << '\n';
   }

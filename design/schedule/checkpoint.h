@@ -32,6 +32,9 @@ struct Checkpoint {
   std::vector<ConvergenceRow> convergence;
 };
 
+/// Describes the plain values of a checkpoint's header.
+void describe(Description& d, Checkpoint& checkpoint);
+
 /// Returns a number that differs for other pictures or other options that change the result.
 std::uint64_t design_fingerprint(const Image& target, const DesignOptions& options);
 

@@ -28,10 +28,10 @@ void expect_equal(const Options& command, const Options& library) {
 }
 
 /// As the command has them after an empty command line, but for what it cannot do without.
-template <class Settings, class Add>
-Settings parsed(const Add& add, const Arguments& needed, Settings settings = {}) {
+template <class Settings>
+Settings parsed(const Arguments& needed, Settings settings = {}) {
   OptionSet options("command", "");
-  add(options, settings);
+  options.fields(settings);
   options.parse(needed);
   return settings;
 }
@@ -42,7 +42,7 @@ TEST(CommandDefaults, OfDesignAreTheLibrarysForEveryModelAndPicture) {
       const Image picture(side, side / 2, 0.5F);
       DesignSettings settings;
       OptionSet options("design", "");
-      add_design_options(options, settings);
+      options.fields(settings);
       options.parse({"picture.png", "--out", "lens", "--model", word});
       settle(options, settings, picture, {});
       const DesignOptions library = default_design_options(model, picture);
@@ -58,7 +58,7 @@ TEST(CommandDefaults, TheModelOfADesignFollowsFromItsSizeUnlessItIsGiven) {
   const auto model = [](int side, const Arguments& more) {
     DesignSettings settings;
     OptionSet options("design", "");
-    add_design_options(options, settings);
+    options.fields(settings);
     Arguments arguments{"picture.png", "--out", "lens"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     options.parse(arguments);
@@ -82,7 +82,7 @@ TEST(CommandDefaults, OfDesignForTheDefaultModelAreTheStructs) {
 TEST(CommandDefaults, OfCamAreTheLibrarys) {
   CamSettings settings;
   OptionSet options("cam", "");
-  add_cam_options(options, settings);
+  options.fields(settings);
   options.parse({"/parts/lens"});
   settle(options, settings);
   expect_equal(settings.cam, CamOptions{});
@@ -94,7 +94,7 @@ TEST(CommandDefaults, OfCamAreTheLibrarys) {
 TEST(CommandDefaults, OfNestAreThoseOfCam) {
   NestSettings settings;
   OptionSet options("nest", "");
-  add_nest_options(options, settings);
+  options.fields(settings);
   options.parse({"/parts/bee", "/parts/bee/", "--blank", "200,100,8", "--out", "sheet"});
   settle(options, settings);
   CamOptions library;
@@ -107,15 +107,15 @@ TEST(CommandDefaults, OfNestAreThoseOfCam) {
 }
 
 TEST(CommandDefaults, OfTheOtherCommandsAreTheLibrarys) {
-  const auto exported = parsed<ExportSettings>(&add_export_options, {"lens", "--out", "a.step"});
+  const auto exported = parsed<ExportSettings>({"lens", "--out", "a.step"});
   expect_equal(exported.options, ExportOptions{});
-  const auto sent = parsed<SendSettings>(&add_send_options, {"a.ngc", "--port", "sim:grbl"});
+  const auto sent = parsed<SendSettings>({"a.ngc", "--port", "sim:grbl"});
   SendOptions library;
   library.port = "sim:grbl";
   expect_equal(sent.job, library);
-  const auto coupon = parsed<CouponSettings>(&add_coupon_options, {"--out", "coupon"});
+  const auto coupon = parsed<CouponSettings>({"--out", "coupon"});
   expect_equal(coupon.coupon, CouponOptions{});
-  const auto reflected = parsed<ReflectSettings>(&add_reflect_options, {"a.stl", "--out", "a"});
+  const auto reflected = parsed<ReflectSettings>({"a.stl", "--out", "a"});
   expect_equal(reflected.reflect, reflect::ReflectOptions{});
   RenderOptions rendered;
   OptionSet options("render", "");
@@ -129,7 +129,7 @@ TEST(CommandDefaults, WhatIsGivenWinsOverTheWorkshop) {
   testing::write_bytes(folder / "shop.toml", "[finish]\npitch = 0.2\nscallop = 0.001\n");
   CamSettings settings;
   OptionSet options("cam", "");
-  add_cam_options(options, settings);
+  options.fields(settings);
   options.parse({"lens", "--workshop", (folder / "shop.toml").string(), "--pitch", "0.1",
                  "--tool-diameter", "0.8", "--no-rough"});
   settle(options, settings);
@@ -159,7 +159,7 @@ TEST(CommandDefaults, AWorkshopNeedsNoToolForWhatIsLeftOut) {
 TEST(CommandDefaults, FactorsOnTheSmoothnessWorkInTheLibrary) {
   DesignSettings settings;
   OptionSet options("design", "");
-  add_design_options(options, settings);
+  options.fields(settings);
   options.parse({"picture.png", "--out", "lens", "--model", "facet", "--smoothness", "3"});
   settle(options, settings, Image(64, 64, 0.5F), {});
   EXPECT_EQ(with_smoothness_applied(settings.design).weights.smooth,

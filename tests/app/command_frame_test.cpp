@@ -2,10 +2,12 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -19,9 +21,7 @@ struct Settings {
   std::string out;
 };
 
-void add_options(OptionSet& options, Settings& settings) {
-  options.text("--out", settings.out, "DIR", "where");
-}
+void describe(Description& d, Settings& settings) { d.text("--out", settings.out, "DIR", "where"); }
 
 struct Ending {
   int exit_code = 0;
@@ -34,7 +34,7 @@ Ending run_with(CommandResult (*work)(CommandFrame& frame, Settings& settings),
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
   Ending ending;
-  ending.exit_code = run_command<Settings>({"try", "Tries.", add_options, work}, arguments);
+  ending.exit_code = run_command<Settings>({"try", "Tries.", work}, arguments);
   ending.out = ::testing::internal::GetCapturedStdout();
   ending.err = ::testing::internal::GetCapturedStderr();
   return ending;
@@ -80,6 +80,16 @@ TEST(CommandFrame, InterruptedWorkLeavesNoFolderBehind) {
   EXPECT_THAT(ending.err, HasSubstr("interrupted; nothing was written"));
   EXPECT_EQ(nlohmann::json::parse(ending.out)["exit_code"], kInterrupted);
   EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST(Metrics, ArePrintedWithoutInfinity) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const nlohmann::json printed =
+      metrics_json(ModelMetrics{{SurfaceModel::kFacet, {0.25, 31.5, 0.5, 0.125, 0.75}},
+                                {SurfaceModel::kSpline, {0.0, infinity, 1.0, 0.0, 1.0}}});
+  EXPECT_EQ(printed.dump(),
+            R"({"facet":{"flux_inside":0.75,"mae":0.25,"mae_linear":0.125,"psnr":31.5,"ssim":0.5},)"
+            R"("spline":{"flux_inside":1.0,"mae":0.0,"mae_linear":0.0,"psnr":null,"ssim":1.0}})");
 }
 
 TEST(CommandFrame, InputCountsAsAcceptedOnceWorkIsReported) {

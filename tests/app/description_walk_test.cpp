@@ -6,6 +6,13 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "app/commands/cam_command.h"
+#include "app/commands/coupon_command.h"
+#include "app/commands/design_command.h"
+#include "app/commands/export_command.h"
+#include "app/commands/nest_command.h"
+#include "app/commands/reflect_command.h"
+#include "app/commands/send_command.h"
 #include "app/frame/option_set.h"
 #include "cam/coupon/coupon_layout.h"
 #include "cam/plan/cam_options.h"
@@ -119,7 +126,9 @@ void expect_options_found() {
   for (const Field& field : fields) {
     EXPECT_THAT(help, HasSubstr("\n  " + field.name));
     EXPECT_THAT(help, HasSubstr(help_text(field)));
-    EXPECT_THAT(manual, HasSubstr(manual_item(field)));
+    if (field.name.starts_with('-')) {
+      EXPECT_THAT(manual, HasSubstr(manual_item(field)));
+    }
     EXPECT_TRUE(names.contains(field.name)) << field.name;
     EXPECT_THAT(docstring_line(field), HasSubstr(keyword_of(field.name) + " ("));
     stored += field.left_out.empty() ? 1 : 0;
@@ -128,9 +137,21 @@ void expect_options_found() {
   require_limits(options);
 }
 
-/// Every option by the command line, alone.
+/// The same option set by its value, as by a keyword of Python.
 template <class Options>
-void expect_command_line_sets() {
+FieldValue taken(const std::string& name, const FieldValue& value) {
+  Options options;
+  const Description fields = description_of(options);
+  OptionSet set("command", "");
+  set.add(fields);
+  set.take({{name, value}});
+  EXPECT_TRUE(set.given(name));
+  return fields.at(name).get();
+}
+
+/// Every option by the command line and by its value, alone.
+template <class Options>
+void expect_options_set() {
   for (std::size_t i = 0; i < description_of(Options()).size(); ++i) {
     Options options;
     const Description fields = description_of(options);
@@ -143,13 +164,14 @@ void expect_command_line_sets() {
     EXPECT_NE(parsed, before) << field.name;
     field.set(wanted);  // A size is kept in whole bytes.
     EXPECT_EQ(parsed, field.get()) << field.name;
+    EXPECT_EQ(taken<Options>(field.name, wanted), parsed) << field.name;
   }
 }
 
 template <class Options>
 void walk() {
   expect_options_found<Options>();
-  expect_command_line_sets<Options>();
+  expect_options_set<Options>();
   Options changed;
   Options fresh;
   expect_files_hold(written_fields(changed), written_fields(fresh));
@@ -166,6 +188,16 @@ TEST(Descriptions, OfOptionsAreFoundByEverything) {
   walk<ExportOptions>();
   walk<reflect::ReflectOptions>();
   walk<SendOptions>();
+}
+
+TEST(Descriptions, OfCommandsSettingsAreFoundByTheCommandLine) {
+  expect_options_found<DesignSettings>();
+  expect_options_found<CamSettings>();
+  expect_options_found<NestSettings>();
+  expect_options_found<CouponSettings>();
+  expect_options_found<ExportSettings>();
+  expect_options_found<ReflectSettings>();
+  expect_options_found<SendSettings>();
 }
 
 TEST(Descriptions, OfWorkshopsAreFoundByEveryFile) {

@@ -103,6 +103,16 @@ class Folder(unittest.TestCase):
             self.assertTrue(Path(file).exists(), file)
         self.assertIn("finish", [operation["name"] for operation in cut["report"]["operations"]])
 
+    def test_cam_with_a_workshop_writes_into_the_lens_folder(self):
+        lens = lensforge.design(small_lens.PICTURE, **small_lens.OPTIONS)
+        lens.save(self.place / "lens")
+        shop = self.place / "shop.toml"
+        shop.write_text("[finish]\npitch = 0.3\n")
+        cut = lensforge.cam(lens, workshop=shop, sample_spacing=0.03)
+        self.assertEqual(cut["report"]["job"], "lens")
+        for file in cut["files"]:
+            self.assertEqual(Path(file).parent, self.place / "lens" / "cam")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad input is a ValueError with the command's own line; a wrong keyword a TypeError."""
+"""Bad input is a ValueError with the command's own line, keywords for options; a wrong keyword a TypeError."""
 
 import os
 import subprocess
@@ -32,7 +32,7 @@ class Errors(unittest.TestCase):
         line = told.stderr.strip().removeprefix("lensforge: ")
         with self.assertRaises(lensforge.InputError) as caught:
             lensforge.design(small_lens.PICTURE, width=-1)
-        self.assertEqual(str(caught.exception), line)
+        self.assertEqual(str(caught.exception), line.removeprefix("--"))
 
     def test_pictures(self):
         self.assert_refused("nowhere.png", lensforge.design, "nowhere.png")
@@ -50,7 +50,24 @@ class Errors(unittest.TestCase):
         for options in ({"rounds": 1.5}, {"rounds": True}, {"fresnel": 1}, {"width": None}):
             with self.assertRaises(TypeError):
                 lensforge.design(FLAT, **options)
-        self.assert_refused("--model", lensforge.design, FLAT, model="bumpy")
+        self.assert_refused("model bumpy: must be one of", lensforge.design, FLAT, model="bumpy")
+
+    def test_values_break_the_rules_of_their_options(self):
+        rule = "must be above 0, at most"
+        for focal in (-1, 0.0, float("nan"), np.float32(-2.5), 10**400, -(10**400), "-1 in"):
+            self.assert_refused("focal ", lensforge.Setup, 8, 8, focal=focal)
+            self.assert_refused(rule, lensforge.Setup, 8, 8, focal=focal)
+        self.assert_refused("width: 'wide' is no length", lensforge.Setup, 8, 8, width="wide")
+        self.assert_refused("rounds 99999999999: must be", lensforge.design, FLAT, rounds=99999999999)
+
+    def test_values_of_every_type(self):
+        wide = lensforge.Setup(8, 8, width="4in", focal=300, image_width=np.float64(50))
+        self.assertEqual(wide.lens_size, (101.6, 101.6))
+        self.assertEqual(wide.image_size, (50.0, 50.0))
+        moved = lensforge.Setup(8, 8, width=10, focal=50, image_offset=(3, np.float32(0.5)))
+        same = lensforge.Setup(8, 8, width=10, focal=50, image_offset="3,0.5")
+        self.assertEqual(moved.to_dict(), same.to_dict())
+        self.assertNotEqual(moved.to_dict(), lensforge.Setup(8, 8, width=10, focal=50).to_dict())
 
     def test_arrays_of_a_mesh(self):
         setup = lensforge.Setup(8, 8, width=10.0, focal=50.0)

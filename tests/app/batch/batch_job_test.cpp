@@ -43,6 +43,15 @@ TEST_F(BatchJobs, AreReadLineByLine) {
   EXPECT_EQ(jobs[1].steps[0].command, "reflect");
 }
 
+TEST_F(BatchJobs, AreStoredAsByEarlierVersions) {
+  const auto jobs = read(
+      "{\"name\":\"a\",\"command\":\"design\",\"target\":\"a.png\",\"options\":{\"focal\":250,"
+      "\"fresnel\":true},\"then\":[\"cam\"]}");
+  EXPECT_EQ(jobs[0].json().dump(),
+            R"({"name":"a","steps":[{"command":"design","options":{"focal":250,"fresnel":true}},)"
+            R"({"command":"cam","options":{}}],"target":"a.png","target_sha256":""})");
+}
+
 TEST_F(BatchJobs, ListsBecomeSeveralWords) {
   const auto jobs = read(
       "{\"name\":\"a\",\"command\":\"design\",\"target\":\"a.png\",\"then\":[{\"command\":\"cam\","

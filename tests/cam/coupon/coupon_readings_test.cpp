@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <optional>
 #include <string>
 
 #include "cam/coupon/coupon_layout.h"
@@ -37,6 +38,41 @@ std::string refusal(const std::string& text) {
 
 TEST(CouponReadings, TheTemplateIsReadAsHavingNone) {
   EXPECT_EQ(parse_readings(readings_template(expected()), "m.toml").count(), 0);
+}
+
+TEST(CouponReadings, TheTemplateIsThatOfEarlierVersions) {
+  const CouponReadings sample{
+      {{40.0, Reading{39.96, 0.03}}},
+      {{0.09, Reading{0.323, 0.003}}},
+      {{0.06, Reading{2.26e-3, 1.13e-4}, std::nullopt, Reading{0.1, 0.015}}},
+      {632.8e-6, 1.5}};
+  const std::string text = readings_template(sample);
+  EXPECT_EQ(text.substr(text.find("\n[light]")), R"(
+[light]
+wavelength_nm = 632.8
+ior = 1.5
+
+# Distance of the marks A and B, centre to centre.
+[[mark]]
+programmed_mm = 40
+# distance_mm =   # expected: about 40
+distance_uncertainty_mm = 0.03
+
+# G1: width at the top, before polishing.
+[[groove]]
+depth_mm = 0.09
+# width_mm =   # expected: about 0.323
+width_uncertainty_mm = 0.003
+
+# P1: height from valley to crest before and after polishing (Rz of a roughness tester
+# across the passes), light of a first order over that of the middle after it.
+[[pad]]
+pitch_mm = 0.06
+# before_um =   # expected: about 2.26
+before_uncertainty_um = 0.11
+# order_ratio =   # expected: about 0.1
+order_ratio_uncertainty = 0.015
+)");
 }
 
 TEST(CouponReadings, AFilledInTemplateIsReadAsItStands) {

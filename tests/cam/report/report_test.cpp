@@ -233,7 +233,9 @@ TEST(Report, JsonSaysTheSame) {
   EXPECT_EQ(json["sampling"]["leakage_error"], -0.00042);
   EXPECT_EQ(json["sampling"]["mae_error"], 0.00003);
   EXPECT_EQ(json["surfaces"].size(), 3U);
-  EXPECT_TRUE(json["surfaces"][0]["psnr"].is_null());
+  EXPECT_EQ(json["surfaces"][0].dump(),
+            R"({"contrast":null,"dark_flux":0.0,"dark_over_bright":0.0,"flux_inside":1.0,)"
+            R"("leakage":0.0,"mae":0.0,"mae_linear":0.0,"name":"logo","psnr":null,"ssim":0.0})");
   EXPECT_TRUE(json["surfaces"][0]["contrast"].is_null());
   EXPECT_EQ(json["operations"][0]["certificate"]["gouge"]["value"], 0.0004);
   EXPECT_EQ(json["places"][0]["causes"][0]["leakage"], 0.013);

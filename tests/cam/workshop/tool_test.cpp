@@ -126,6 +126,18 @@ TEST(Workshop, PitchFollowsFromTheScallop) {
   EXPECT_NEAR(pitch, 0.06, 3e-4);
 }
 
+TEST(Workshop, ItsTomlIsThatOfEarlierVersions) {
+  const std::string text = workshop_toml({});
+  EXPECT_TRUE(text.starts_with(
+      "# A workshop of lensforge cam: machine, blank, clamps, tools and process.\n\n"
+      "# The mill. Sizes are millimetres.\n[machine]\nname = "));
+  EXPECT_NE(
+      text.find("\n[material]\nname = \"cast acrylic (PMMA)\"\n"
+                "# ior =  # refractive index, checked against the lens's (Sun et al., Section 5: "
+                "1.49)\n"),
+      std::string::npos);
+}
+
 TEST(Workshop, WrittenTomlReadsBackEqual) {
   EXPECT_EQ(parse_workshop(workshop_toml({}), "defaults"), Workshop{});
   Workshop shop;

@@ -187,6 +187,38 @@ TEST(Lens, TheJsonHasTheFieldsOfTheInterface) {
   EXPECT_EQ(document.size(), 19U);
 }
 
+TEST(Lens, ItsMetricsAreWrittenAsByEarlierVersions) {
+  const TempFolder folder;
+  Lens lens = sample_lens();
+  lens.source_limit = ImageMetrics{0.25, 12.5, 0.5, 0.125, 0.75};
+  write_lens(lens, folder.path());
+  EXPECT_THAT(read_bytes(folder / "lens.json"), HasSubstr(R"(
+  "metrics": {
+    "facet": {
+      "mae": 0.01,
+      "psnr": 31.5,
+      "ssim": 0.97,
+      "flux_inside": 0.999,
+      "mae_linear": 0.005
+    },
+    "smooth": {
+      "mae": 0.0,
+      "psnr": null,
+      "ssim": 1.0,
+      "flux_inside": 1.0,
+      "mae_linear": 0.0
+    },
+    "source_limit": {
+      "mae": 0.25,
+      "psnr": 12.5,
+      "ssim": 0.5,
+      "flux_inside": 0.75,
+      "mae_linear": 0.125
+    }
+  },
+)"));
+}
+
 TEST(Lens, ASurfaceThatIsNoGridComesBackWithoutOne) {
   const TempFolder folder;
   Lens lens = sample_lens();

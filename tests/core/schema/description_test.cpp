@@ -6,6 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "core/error.h"
 #include "core/schema/json.h"
@@ -143,6 +145,7 @@ TEST(Description, LimitsHoldWhatTheirRuleSays) {
   EXPECT_TRUE(Limits::between(0, 1).hold(0));
   EXPECT_THAT(Limits::zero_or(2, 9).rule(), StrEq("0, or 2 to 9"));
   EXPECT_THAT(Limits::above(0, 1e7).rule(), StrEq("above 0, at most 1e+07"));
+  EXPECT_THAT(Limits{.low = 3}.rule(), StrEq("3 or more"));
 }
 
 TEST(Description, ANumberOutsideItsLimitsIsNamedWithValueAndRule) {
@@ -206,6 +209,28 @@ TEST(Description, JsonIsReadWithItsRules) {
             R"(toy.json: field 'side' is "up": it must be "none" or "left")");
   EXPECT_EQ(refusal(R"({"count": 1})"), "toy.json: field 'count' is 1: it must be 0, or 2 to 9");
   EXPECT_EQ(refusal(R"({"part": [{"mass": 1}, {}]})"), "toy.json: field 'part[1].mass' is missing");
+}
+
+TEST(Description, JsonHasNullForANumberThatIsNotFinite) {
+  double value = std::numeric_limits<double>::infinity();
+  Description fields;
+  fields.number("value", value, {}, "", "").infinite_if_null = true;
+  EXPECT_EQ(json_of(fields).dump(), R"({"value":null})");
+  value = 1.5;
+  EXPECT_EQ(json_of(fields).dump(), R"({"value":1.5})");
+  read_json(fields, JsonFields({{"value", nullptr}}, "toy.json"));
+  EXPECT_EQ(value, std::numeric_limits<double>::infinity());
+}
+
+TEST(Description, ARowHoldsItsValuesInOrder) {
+  const std::set<std::string> lists{"lid", "part"};
+  const nlohmann::json row = row_of(description_of(other_toy()).except(lists));
+  EXPECT_EQ(row.dump(), R"([true,true,5,0.30000000000000004,1e-07,"left","b \"c\""])");
+  Toy toy;
+  read_row(description_of(toy).except(lists), row);
+  EXPECT_EQ(row_of(description_of(toy).except(lists)), row);
+  EXPECT_THROW(read_row(description_of(toy), {true, true}), nlohmann::json::exception);
+  EXPECT_THROW(read_row(description_of(toy), {true, "no"}), nlohmann::json::exception);
 }
 
 TEST(Description, AFingerprintHoldsWhatIsNotLeftOut) {

@@ -125,6 +125,21 @@ TEST(SplineFile, ComesBackToTheBit) {
   EXPECT_EQ(folder.file_count(), 1U);
 }
 
+TEST(SplineFile, BeginsAsThoseOfEarlierVersions) {
+  const TempFolder folder;
+  ControlNet net = sample_spline();
+  net.shape = {5, 4};
+  net.points = Eigen::Matrix3Xd::Constant(3, 20, 0.25);
+  write_spline(net, folder / "surface.spline");
+  const std::string head =
+      "lensforge spline 1\n"
+      R"({"units":"mm","degree":3,"knots":"uniform, clamped","control_points":[5,4]})"
+      "\n";
+  const std::string bytes = read_bytes(folder / "surface.spline");
+  EXPECT_EQ(bytes.substr(0, head.size()), head);
+  EXPECT_EQ(bytes.size(), head.size() + 3 * 20 * sizeof(double));
+}
+
 struct Damage {
   const char* name;
   std::function<void(std::string&)> apply;

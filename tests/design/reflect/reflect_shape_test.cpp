@@ -196,6 +196,21 @@ TEST(ReflectCheckpoint, ComesBackToTheBit) {
   EXPECT_EQ(after.updates[1].seconds, 0.5);
 }
 
+TEST(ReflectCheckpoint, AFileIsThatOfEarlierVersions) {
+  const TempFolder folder;
+  write_checkpoint(sample(), folder / "checkpoint");
+  const std::string head =
+      "lensforge reflect checkpoint 1\n"
+      R"({"direct":0.3333333333333333,"faces":2,"fingerprint":18364758544493064720,"first":1,)"
+      R"("seconds":0.30000000000000004,"split":[3,7],"stage":2,"total":0.14285714285714285,)"
+      R"("updates":[[1,"face",0.1,1e-17,0.1111111111111111,0.7],[2,"split",0.2,0.3,0.4,0.5]],)"
+      R"("vertices":5})"
+      "\n";
+  const std::string bytes = testing::read_bytes(folder / "checkpoint");
+  EXPECT_EQ(bytes.substr(0, head.size()), head);
+  EXPECT_EQ(bytes.size(), head.size() + (3 * 5 + 3 * 2 + 1) * sizeof(double));
+}
+
 TEST(ReflectCheckpoint, OneOfAnotherRunOrWithOtherNumbersIsRefused) {
   const TempFolder folder;
   const auto refusal = [&](const ReflectCheckpoint& checkpoint, std::uint64_t fingerprint) {

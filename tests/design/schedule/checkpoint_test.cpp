@@ -103,6 +103,36 @@ TEST(Checkpoint, ComesBackToTheBit) {
   EXPECT_EQ(after.convergence[2].mae, 1.0 / 7.0);
 }
 
+TEST(Checkpoint, AFileIsThatOfEarlierVersions) {
+  const TempFolder folder;
+  Checkpoint checkpoint = sample();
+  checkpoint.convergence.resize(1);
+  write_checkpoint(checkpoint, folder / "checkpoint");
+  const std::string head =
+      "lensforge checkpoint 4\n"
+      R"({"columns":7,"convergence":[["render",1,2,1,0.1,0.7,1e-17,1e+17,0.3333333333333333,)"
+      R"(0.2,0.3,0.4,0.1111111111111111,3.3333333333333337e-10,1e-300,0.09090909090909091,)"
+      R"(0.14285714285714285,0.7]],"fingerprint":18364758544493064720,"level":2,"round":3,)"
+      R"("rows":6,"scales":[0.3333333333333333,1.4285714285714285e-10],)"
+      R"("seconds":0.30000000000000004,"transporting":false,"value":142.85714285714286})"
+      "\n";
+  const std::string bytes = testing::read_bytes(folder / "checkpoint");
+  EXPECT_EQ(bytes.substr(0, head.size()), head);
+  EXPECT_EQ(bytes.size(), head.size() + (2 * 3 * 7 * 6 + 1) * sizeof(double));
+  EXPECT_EQ(convergence_csv(checkpoint.convergence),
+            "stage,level,round,iteration,image,unlit,gradient,boundary,barrier,face,edge,laplacian,"
+            "align,flux,total,mass_error,mae,seconds\n"
+            "render,1,2,1,0.1,0.7,1e-17,1e+17,0.333333333,0.2,0.3,0.4,0.111111111,3.33333333e-10,"
+            "1e-300,0.0909090909,0.142857143,0.7\n");
+}
+
+TEST(Checkpoint, ARowWithoutAllOfItsValuesIsRefused) {
+  const TempFolder folder;
+  const std::string bytes = sample_bytes(folder);
+  EXPECT_THAT(refusal_of(folder, forged(bytes, ",0.7],", "],")), HasSubstr("bad header"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, ",0.7],", ",\"0.7\"],")), HasSubstr("bad header"));
+}
+
 TEST(Checkpoint, AValueThatIsNotKnownYetStaysInfinite) {
   const TempFolder folder;
   for (const bool transporting : {true, false}) {

@@ -79,6 +79,32 @@ TEST_F(Journals, ReadBackAsWritten) {
   EXPECT_EQ(record.torn, 0);
 }
 
+TEST_F(Journals, AFileIsThatOfEarlierVersions) {
+  const auto journal = Journal::create(path(), kJob, {});
+  WorkOrigins origins;
+  origins.fill(Eigen::Vector3d::Zero());
+  origins.back() = {1.5, -2.0, 0.25};
+  journal->origins(origins);
+  journal->progress(at_line(1));
+  journal->note(1, "rpm fell to 21000");
+  JobProgress last = at_line(2);
+  last.position.reset();
+  journal->end("held", "the door was opened", last);
+  std::string text = R"(b6c77536 {"bytes":123456,"format":"lensforge.journal","kind":"job",)";
+  text += R"("name":"lens.ngc","sha256":")" + kJob.sha256;
+  text += R"(","version":1}
+f2aefe81 {"kind":"run"}
+3dd0fe8a {"kind":"origins","origins":[[0.0,0.0,0.0],[0.0,0.0,0.0],[0.0,0.0,0.0],[0.0,0.0,0.0],)";
+  text += R"([0.0,0.0,0.0],[1.5,-2.0,0.25]]}
+8876fee4 {"ack":2,"at":[0.5,-1.25,3.0],"byte":20,"done":1,"kind":"at","rpm":22950.0,"sent":3,)";
+  text += R"("spindle":"at speed","state":"Run"}
+4fae59b2 {"kind":"note","line":1,"text":"rpm fell to 21000"}
+3340bbe2 {"ack":3,"byte":40,"done":2,"kind":"end","reason":"the door was opened","rpm":22950.0,)";
+  text += R"("sent":4,"spindle":"at speed","state":"Run","status":"held"}
+)";
+  EXPECT_EQ(read_bytes(path()), text);
+}
+
 TEST_F(Journals, KnowAFinishedJob) {
   Journal::create(path(), kJob, {})->end("done", "", at_line(9));
   EXPECT_TRUE(read_journal(path()).finished);
