@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bench/light_scene.h"
 
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 #include <limits>
 #include <string>
@@ -14,12 +18,36 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kOn = -1;  ///< Embree's mark of a lane in use.
 
+// Both tell Embree that neighbouring rays are close to each other.
+#if RTC_VERSION_MAJOR >= 4
+void intersect(const int* valid, RTCScene scene, RTCRayHit16& rays) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, &rays, &arguments);
+}
+void occlude(const int* valid, RTCScene scene, RTCRay16& rays) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcOccluded16(valid, scene, &rays, &arguments);
+}
+#else
 RTCIntersectContext coherent_context() {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   return context;
 }
+void intersect(const int* valid, RTCScene scene, RTCRayHit16& rays) {
+  RTCIntersectContext context = coherent_context();
+  rtcIntersect16(valid, scene, &context, &rays);
+}
+void occlude(const int* valid, RTCScene scene, RTCRay16& rays) {
+  RTCIntersectContext context = coherent_context();
+  rtcOccluded16(valid, scene, &context, &rays);
+}
+#endif
 
 void set_ray(RTCRay16& rays, int lane, const Eigen::Vector3f& origin,
              const Eigen::Vector3f& direction, float nearest) {
@@ -95,8 +123,7 @@ std::array<int, kLanes> LightScene::triangles_above(const Places& places, int co
     packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     valid[static_cast<std::size_t>(i)] = kOn;
   }
-  RTCIntersectContext context = coherent_context();
-  rtcIntersect16(valid.data(), handles_->scene, &context, &packet);
+  intersect(valid.data(), handles_->scene, packet);
   std::array<int, kLanes> met{};
   for (int i = 0; i < count; ++i) {
     const bool hit = packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
@@ -113,8 +140,7 @@ int LightScene::blocked(const RayPacket& rays) const {
     set_ray(packet, i, rays.origins[k].cast<float>(), rays.directions[k].cast<float>(), kClearance);
     valid[k] = kOn;
   }
-  RTCIntersectContext context = coherent_context();
-  rtcOccluded16(valid.data(), handles_->scene, &context, &packet);
+  occlude(valid.data(), handles_->scene, packet);
   int blocked = 0;
   for (int i = 0; i < rays.size; ++i) blocked += packet.tfar[i] < 0.0F ? 1 : 0;
   return blocked;

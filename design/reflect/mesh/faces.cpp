@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/reflect/mesh/faces.h"
 
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 #include <tbb/task_arena.h>
 
 #include <Eigen/Geometry>
@@ -339,6 +343,23 @@ RTCRay ray_from(const Eigen::Vector3d& p, const Eigen::Vector3d& w, double reach
   return ray;
 }
 
+// Embree 4 has no context of a query any more.
+#if RTC_VERSION_MAJOR >= 4
+void intersect(RTCScene scene, RTCRayHit& query) { rtcIntersect1(scene, &query); }
+void occlude(RTCScene scene, RTCRay& ray) { rtcOccluded1(scene, &ray); }
+#else
+void intersect(RTCScene scene, RTCRayHit& query) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene, &context, &query);
+}
+void occlude(RTCScene scene, RTCRay& ray) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(scene, &context, &ray);
+}
+#endif
+
 }  // namespace
 
 RayScene::RayScene(const SurfaceMesh& mesh) {
@@ -357,21 +378,17 @@ RayScene::RayScene(const SurfaceMesh& mesh) {
 }
 
 RayHit RayScene::nearest(const Eigen::Vector3d& p, const Eigen::Vector3d& w) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRayHit query{};
   query.ray = ray_from(p, w, std::numeric_limits<double>::infinity());
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(handles_->scene, &context, &query);
+  intersect(handles_->scene, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
   return {static_cast<int>(query.hit.primID), static_cast<double>(query.ray.tfar)};
 }
 
 bool RayScene::blocked(const Eigen::Vector3d& p, const Eigen::Vector3d& w, double reach) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRay ray = ray_from(p, w, reach);
-  rtcOccluded1(handles_->scene, &context, &ray);
+  occlude(handles_->scene, ray);
   return ray.tfar < 0.0F;
 }
 
