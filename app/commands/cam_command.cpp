@@ -36,12 +36,15 @@ std::string folder_name(const fs::path& folder) {
 void describe(Description& d, CamSettings& settings) {
   d.text("DIR", settings.source, "", "lens folder; --show-workshop needs none");
   d.text("--workshop", settings.workshop, "FILE.toml",
-         "machine, blank, clamps, tools and process; options given here win");
-  d.flag("--show-workshop", settings.show_workshop, "print the workshop in use as TOML and exit");
+         "machine, blank, clamps, tools and process; options given here win")
+      .essential = true;
+  d.flag("--show-workshop", settings.show_workshop, "print the workshop in use as TOML and exit")
+      .essential = true;
   d.texts("--compare", settings.compare, "KEY=VALUE,…",
           "rank choices by leakage and hours instead of making programs: tool=0.3,0.4 "
           "pitch=0.04,0.06 slope=3e-5,6e-5 large=0,4 (finishing only); mae=0.004 recommends the "
-          "quickest that reaches it");
+          "quickest that reaches it")
+      .essential = true;
   describe(d, settings.cam);
 }
 
@@ -202,7 +205,8 @@ CommandResult run(CommandFrame& frame, CamSettings& settings) {
 
 int cam_command(const Arguments& arguments) {
   return run_command<CamSettings>(
-      {"cam", "Makes the programs that mill a lens and predicts what it will project.", run},
+      {"cam", "Makes the programs that mill a lens and predicts what it will project.", run,
+       "lensforge cam lens --workshop mine.toml --post grbl"},
       arguments);
 }
 

@@ -122,11 +122,13 @@ void describe(Description& d, DesignSettings& settings) {
          "--source-size; without it the lamp is an evenly lit disc");
   d.text("--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
          "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
-         "in a picture, seen from the cutter's side");
+         "in a picture, seen from the cutter's side")
+      .essential = true;
   describe(d, settings.background);
   describe(d, settings.design.weights);
   d.text("--made-by", settings.made_by, "default|FILE.toml",
-         "shape the part that this workshop cuts and polishes, not the surface alone");
+         "shape the part that this workshop cuts and polishes, not the surface alone")
+      .essential = true;
   d.flag("--robust", settings.robust,
          "with --made-by: right on average over parts that are polished less and more by the "
          "workshop's tolerances.polish_sigma; takes twice as long");
@@ -135,7 +137,8 @@ void describe(Description& d, DesignSettings& settings) {
          "serve a page that shows the design while it runs, to browsers on this machine; 0 "
          "takes a free port");
   d.flag("--resume", settings.resume,
-         "continue the interrupted design in --out, with the same picture and options");
+         "continue the interrupted design in --out, with the same picture and options")
+      .essential = true;
   d.flag("--force", settings.force, "replace the design that --out holds");
 }
 
@@ -517,7 +520,12 @@ CommandResult finish(CommandFrame& frame, const ChosenDevice& device, const Desi
   if (keeps) {
     outcome.notes.push_back(folder.string() + " keeps its earlier lens until the new one is done");
   }
-  if (!done) outcome.notes.emplace_back(kContinueWithResume);
+  if (done) {
+    outcome.notes.push_back("look at " + (folder / lens_file::kOverview).string() +
+                            "; then: lensforge cam " + shell_word(folder.string()));
+  } else {
+    outcome.notes.emplace_back(kContinueWithResume);
+  }
   return outcome;
 }
 
@@ -627,8 +635,10 @@ CommandResult run(CommandFrame& frame, DesignSettings& settings) {
 }  // namespace
 
 int design_command(const Arguments& arguments) {
-  return run_command<DesignSettings>({"design", "Shapes a lens that projects a picture.", run},
-                                     arguments);
+  return run_command<DesignSettings>(
+      {"design", "Shapes a lens that projects a picture.", run,
+       "lensforge design photo.jpg --out lens --width 60mm --focal 200mm"},
+      arguments);
 }
 
 }  // namespace lensforge::app

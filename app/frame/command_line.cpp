@@ -11,6 +11,7 @@
 #include <csignal>
 #include <exception>
 #include <new>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -319,7 +320,9 @@ std::string overall_help() {
             command.summary + "\n";
   }
   text +=
-      "\n  lensforge COMMAND --help lists a command's options, their units and defaults\n"
+      "\n  lensforge COMMAND --help lists a command's options, their units and defaults; for\n"
+      "      design and cam those that matter most, and --help-all the others\n"
+      "  lensforge completions bash|zsh|fish   what completes commands and options in that shell\n"
       "  lensforge --version\n\n"
       "Exit codes: 0 done; 1 failed while running; 2 bad usage or input; 3 done, but a stated\n"
       "limit was not met; 130 interrupted, with everything done so far kept.\n";
@@ -348,6 +351,13 @@ void require_one_process(const std::string& command) {
                    std::to_string(rank_count()) + "; only design shares its work out");
 }
 
+std::string command_advice(const std::string& name) {
+  std::set<std::string> names{"completions", "help"};
+  for (const Subcommand& command : kSubcommands) names.emplace(command.name);
+  const std::string meant = nearest_word(name, names);
+  return meant.empty() ? "lensforge --help lists them" : "did you mean " + meant + "?";
+}
+
 int dispatch(const Arguments& arguments) {
   if (arguments.empty()) throw InputError("no command given; lensforge --help lists them");
   const std::string& name = arguments.front();
@@ -361,7 +371,14 @@ int dispatch(const Arguments& arguments) {
     require_one_process(name);
     return command.run({arguments.begin() + 1, arguments.end()});
   }
-  throw InputError(name + ": no such command; lensforge --help lists them");
+  throw InputError(name + ": no such command; " + command_advice(name));
+}
+
+/// One name a line.
+std::string names_of(const ListedOptions& listed) {
+  std::string text;
+  for (const FieldSpec& spec : listed.options) text += spec.name + "\n";
+  return text;
 }
 
 int guarded(const Arguments& arguments) {
@@ -371,6 +388,9 @@ int guarded(const Arguments& arguments) {
     return dispatch(arguments);
   } catch (const HelpText& help) {
     print_to_stdout(help.text);
+    return kDone;
+  } catch (const ListedOptions& listed) {
+    print_to_stdout(names_of(listed));
     return kDone;
   } catch (const InputError& e) {
     return report_error(e.what(), kBadInput, json);

@@ -123,6 +123,7 @@ struct Command {
   std::string name;
   std::string description;
   CommandResult (*run)(CommandFrame& frame, Settings& settings);
+  std::string example = "";  ///< For a help that lists essential options only.
 };
 
 /// Parses the arguments, runs the work in a frame and prints its result. Returns the exit code.
@@ -132,7 +133,7 @@ int run_framed(const std::string& command, OptionSet& options, const Arguments& 
 template <class Settings>
 int run_command(const Command<Settings>& command, const Arguments& arguments) {
   Settings settings;
-  OptionSet options(command.name, command.description);
+  OptionSet options(command.name, command.description, command.example);
   options.fields(settings);
   return run_framed(command.name, options, arguments,
                     [&](CommandFrame& frame) { return command.run(frame, settings); });

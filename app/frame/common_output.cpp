@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/frame/common_output.h"
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdio>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "app/frame/console.h"
@@ -31,7 +34,9 @@ std::string metrics_text(const ModelMetrics& metrics) {
 }
 
 std::string metrics_text(const Lens& lens) {
-  const std::string models = metrics_text(lens.metrics);
+  ModelMetrics shown = lens.metrics;
+  if (lens.model != SurfaceModel::kFacet && shown.size() > 1) shown.erase(SurfaceModel::kFacet);
+  const std::string models = metrics_text(shown);
   if (!lens.source_limit) return models;
   return models + "  limit   " + metrics_text(*lens.source_limit) +
          "  of any surface, this source\n";
@@ -46,6 +51,17 @@ nlohmann::json files_json(const std::vector<std::filesystem::path>& files) {
   nlohmann::json list = nlohmann::json::array();
   for (const std::filesystem::path& file : files) list.push_back(file.string());
   return list;
+}
+
+std::string shell_word(const std::string& text) {
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+           std::strchr("_-./+=,:@%", c) != nullptr;
+  };
+  if (!text.empty() && std::all_of(text.begin(), text.end(), is_plain)) return text;
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return word + "'";
 }
 
 std::string size_text(long columns, long rows) {

@@ -20,7 +20,8 @@ class Console;
 std::string metrics_text(const ImageMetrics& metrics);
 /// One line per model.
 std::string metrics_text(const ModelMetrics& metrics);
-/// One line per model, and one for the limit of the lens's source, if it has one.
+/// One line per model, without facets unless the lens has them, and one for the limit of the lens's
+/// source, if it has one.
 std::string metrics_text(const Lens& lens);
 
 /// Formats a number with `digits` decimals.
@@ -31,6 +32,9 @@ std::string fringe_text(const Fringe& fringe);
 
 /// The paths of files, in order.
 nlohmann::json files_json(const std::vector<std::filesystem::path>& files);
+
+/// The text as one word of a shell: in quotes where it needs them.
+std::string shell_word(const std::string& text);
 
 /// Joins two counts as "256 x 192".
 std::string size_text(long columns, long rows);

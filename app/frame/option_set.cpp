@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/frame/option_set.h"
 
+#include <sys/ioctl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
@@ -10,7 +13,9 @@
 #include <exception>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -119,11 +124,40 @@ using Words = std::vector<std::string>;
 constexpr const char* kCommonGroup = "Common options";
 constexpr double kMaxThreads = 1024;
 constexpr std::size_t kHelpColumn = 34;
+constexpr std::size_t kMinHelpWidth = 20;  ///< Of a description.
 
-/// --help with one option a line, its default and its limits.
+/// Columns of the terminal that standard output is; nothing if it is none.
+std::optional<std::size_t> terminal_columns() {
+  winsize size{};
+  if (::isatty(STDOUT_FILENO) == 0 || ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0) return {};
+  if (size.ws_col == 0) return {};
+  return size.ws_col;
+}
+
+/// Lines of at most `width` bytes, unless a word is longer.
+std::string wrapped(std::string_view text, std::size_t width) {
+  std::string lines;
+  std::size_t length = 0;
+  for (const std::string_view word : split(text, ' ')) {
+    const bool fits = length == 0 || length + 1 + word.size() <= width;
+    if (!lines.empty()) lines += fits ? ' ' : '\n';
+    length = fits && length > 0 ? length + 1 + word.size() : word.size();
+    lines += word;
+  }
+  return lines;
+}
+
+/// --help with one option a line, its default and its limits, wrapped to a terminal.
 class Formatter : public CLI::Formatter {
  public:
   Formatter() { column_width(kHelpColumn); }
+
+  std::string make_option_desc(const CLI::Option* option) const override {
+    const std::optional<std::size_t> columns = terminal_columns();
+    if (!columns) return option->get_description();
+    const std::size_t width = std::max(*columns, kHelpColumn + kMinHelpWidth) - kHelpColumn;
+    return wrapped(option->get_description(), width);
+  }
 
   std::string make_option_opts(const CLI::Option* option) const override {
     std::string text;
@@ -182,12 +216,15 @@ struct OptionSet::Parser {
   }
 
   CLI::App app;
+  std::string example;              ///< At the end of the short help.
   std::deque<BoundOption> options;  ///< Those of the command, then the common ones.
   std::size_t own = 0;              ///< Of the command.
 };
 
-OptionSet::OptionSet(const std::string& command, const std::string& description)
+OptionSet::OptionSet(const std::string& command, const std::string& description,
+                     const std::string& example)
     : parser_(std::make_unique<Parser>(command, description)) {
+  parser_->example = example;
   parser_->app.formatter(std::make_shared<Formatter>());
 }
 
@@ -200,6 +237,7 @@ void OptionSet::add(const Description& description) {
 void OptionSet::bind(const Field& field) {
   BoundOption& option = parser_->options.emplace_back(BoundOption{field, {}});
   CLI::App& app = parser_->app;
+  const std::string names = field.name == "--out" ? "-o,--out" : field.name;
   const FieldValue initial = field.get();
   if (field.kind == FieldKind::kFlag) {
     const auto count = [&option](std::int64_t times) { option.given = times > 0; };
@@ -208,15 +246,15 @@ void OptionSet::bind(const Field& field) {
       flag_value(name, value);
       return std::string();
     };
-    app.add_flag_function(field.name, count, field.help)->check(refuse_others);
+    app.add_flag_function(names, count, field.help)->check(refuse_others);
   } else if (std::holds_alternative<Words>(initial)) {
     const auto take = [&option](const Words& words) { option.given = words; };
-    app.add_option_function<Words>(field.name, take, field.help)->type_name(placeholder(field));
+    app.add_option_function<Words>(names, take, field.help)->type_name(placeholder(field));
   } else {
     const auto take = [&option](const std::string& text) {
       option.given = value_of(option.field, text);
     };
-    app.add_option_function<std::string>(field.name, take, help_text(field))
+    app.add_option_function<std::string>(names, take, help_text(field))
         ->type_name(placeholder(field))
         ->default_str(value_text(initial));
   }
@@ -229,6 +267,24 @@ void OptionSet::restate() {
   }
 }
 
+std::string OptionSet::help(bool all) const {
+  CLI::App& app = parser_->app;
+  if (all || parser_->example.empty()) return app.help();
+  std::size_t others = 0;
+  for (const BoundOption& option : parser_->options) {
+    CLI::Option* const shown = app.get_option(option.field.name);
+    if (option.field.essential || option.field.needed || shown->get_positional() ||
+        shown->get_group() == kCommonGroup) {
+      continue;
+    }
+    shown->group("");  // Hides it.
+    ++others;
+  }
+  app.footer(joined({"Example:\n  ", parser_->example, "\n\n--help-all lists ",
+                     std::to_string(others), " more options.\n"}));
+  return app.help();
+}
+
 void OptionSet::add_common() {
   parser_->own = parser_->options.size();
   add(describe_common(common_));
@@ -237,6 +293,10 @@ void OptionSet::add_common() {
       ->type_name("FILE.toml");
   app.set_help_flag("-h,--help", "print this help and exit");
   app.set_help_all_flag("--help-man", "print the options as a part of the manual page")->group("");
+  if (!parser_->example.empty()) {
+    const std::string text = "print all options and exit";
+    app.add_flag("--help-all", text)->configurable(false)->group(kCommonGroup);
+  }
   app.set_version_flag("--version", program_mark(), "print the version");
   for (const char* name :
        {"--json", "--quiet", "--threads", "--device", "--config", "--help", "--version"}) {
@@ -244,10 +304,24 @@ void OptionSet::add_common() {
   }
 }
 
+std::string OptionSet::advice(const Arguments& unexpected, const Words& names) const {
+  for (const std::string& argument : unexpected) {
+    const std::string word = argument.substr(0, argument.find('='));
+    if (!word.starts_with("--")) continue;
+    const std::string meant = nearest_word(word.substr(2), {names.begin(), names.end()});
+    if (!meant.empty()) return "did you mean --" + meant + "?";
+  }
+  return parser_->app.get_name() + " --help lists the options";
+}
+
 void OptionSet::parse(const Arguments& arguments) {
   add_common();
   if (arguments == Arguments{kListOptions}) throw ListedOptions{listed()};
   CLI::App& app = parser_->app;
+  // Also without what the command requires, as --help.
+  if (std::find(arguments.begin(), arguments.end(), "--help-all") != arguments.end()) {
+    throw HelpText(help(true));
+  }
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {
     if (option->get_configurable() && !option->get_positional()) {
@@ -264,11 +338,13 @@ void OptionSet::parse(const Arguments& arguments) {
     // CLI11 takes its arguments last one first.
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {
-    throw HelpText(app.help());
+    throw HelpText(help(false));
   } catch (const CLI::CallForAllHelp&) {
     throw HelpText(manual());
   } catch (const CLI::CallForVersion&) {
     throw HelpText(version_line());
+  } catch (const CLI::ExtrasError& e) {
+    throw InputError(std::string(e.what()) + "; " + advice(app.remaining(), names));
   } catch (const CLI::ParseError& e) {
     throw InputError(std::string(e.what()) + "; " + app.get_name() + " --help lists the options");
   }

@@ -52,7 +52,10 @@ struct ChosenDevice {
 /// variable; the variable's initial value is the default in --help.
 class OptionSet {
  public:
-  OptionSet(const std::string& command, const std::string& description);
+  /// @param example  if there is one, --help lists the essential options only and ends with it, and
+  ///                 --help-all lists all.
+  OptionSet(const std::string& command, const std::string& description,
+            const std::string& example = "");
   ~OptionSet();
   OptionSet(const OptionSet&) = delete;
   OptionSet& operator=(const OptionSet&) = delete;
@@ -88,10 +91,15 @@ class OptionSet {
   struct Parser;
 
   void bind(const Field& field);
+  /// @param all  false: only essential options, if the command has an example.
+  [[nodiscard]] std::string help(bool all) const;
   void add_common();
   /// restate(), and a check of the device.
   void apply();
   [[nodiscard]] std::vector<FieldSpec> listed() const;
+  /// A clause for arguments that are no options: which of the options was likely meant.
+  [[nodiscard]] std::string advice(const Arguments& unexpected,
+                                   const std::vector<std::string>& names) const;
   /// The options of the command as mdoc list items.
   [[nodiscard]] std::string manual() const;
 

@@ -285,10 +285,11 @@ void describe_tools(Description& d, CamOptions& o, const Description& shop) {
   const Field diameter = shop.at("tool.diameter");
   describe_diameter(d, o, "--tool-diameter", kBall, diameter, "finishing ball-end mill");
   // A given pitch takes precedence over one from a scallop.
-  d.like(shop.at("finish.pitch"), "--pitch", "maximum stepover between rows").set =
-      [&finish = o.workshop.process.finish](const FieldValue& value) {
-        finish.set_pitch(number_of(value));
-      };
+  Field& pitch = d.like(shop.at("finish.pitch"), "--pitch", "maximum stepover between rows");
+  pitch.set = [&finish = o.workshop.process.finish](const FieldValue& value) {
+    finish.set_pitch(number_of(value));
+  };
+  pitch.essential = true;
   d.like(shop.at("finish.scallop"), "--scallop",
          "height of scallops; if above 0, the pitch follows from it");
   describe_ball(d, o, "--spindle", &Tool::spindle_rpm, shop.at("tool.spindle_rpm"),
@@ -379,18 +380,21 @@ void describe_programs(Description& d, CamOptions& o) {
          {{"operation", ProgramGrouping::kOperation},
           {"tool", ProgramGrouping::kTool},
           {"one", ProgramGrouping::kAll}},
-         "a file per operation, per tool, or one where the dialect changes tools");
+         "a file per operation, per tool, or one where the dialect changes tools")
+      .essential = true;
   describe_split(d, o.largest_file);
   describe_spindle_start(d, o.spin_up, o.coolant);
 }
 
 void describe_prediction(Description& d, CamOptions& o, const Description& shop) {
-  d.without("--no-render", o.render, "programs only, without the predicted picture");
+  d.without("--no-render", o.render, "programs only, without the predicted picture").essential =
+      true;
   d.without("--no-remedies", o.remedies, "do not try what helps where most light leaks");
   d.whole("--tolerances", o.tolerances,
           Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
           "how sure the forecast is: predict so many parts with the errors of the workshop's "
-          "[tolerances]; 0: none");
+          "[tolerances]; 0: none")
+      .essential = true;
   d.whole("--tolerance-seed", o.tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),
           "seed of the random numbers of --tolerances");
   d.like(shop.at("polish.sigma"), "--polish-sigma",

@@ -499,8 +499,9 @@ void describe_post(Description& d, PostDescription& post) {
   constexpr const char* kOption = "--post";
   d.text(
       {.name = kOption,
-       .help = "dialect: linuxcnc, grbl, grblhal, fanuc, weihong, or a description of one",
-       .unit = "NAME|FILE.toml"},
+       .help = "dialect, or a description of one",
+       .unit = joined(builtin_posts(), "|") + "|FILE.toml",
+       .essential = true},
       [&post] { return post.name; },
       [&post](const std::string& text) { post = find_post(text, kOption); });
 }

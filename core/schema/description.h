@@ -70,6 +70,7 @@ struct FieldSpec {
   std::vector<std::string> words = {};  ///< Allowed words.
   std::size_t count = 0;                ///< Of several numbers; 0: any.
   bool needed = false;                  ///< Must be given.
+  bool essential = false;               ///< In a command's short help, where it has one.
   bool zero_if_missing = false;         ///< Also allows 0 or an empty list, which files leave out.
   bool infinite_if_null = false;        ///< Numbers that are not finite are null in JSON.
   std::string left_out = {};            ///< Why a fingerprint omits it; empty if it does not.

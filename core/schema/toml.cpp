@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <sstream>
 #include <system_error>
@@ -20,7 +19,6 @@ namespace lensforge {
 namespace {
 
 constexpr std::size_t kLongestText = 200;
-constexpr std::size_t kMaxEdits = 2;  ///< Maximum for a mistyped key: two letters swapped.
 
 /// The value as in the file; for a table or array only its kind.
 std::string shown(const toml::node* value) {
@@ -33,34 +31,6 @@ std::string shown(const toml::node* value) {
     if constexpr (!toml::is_table<decltype(node)> && !toml::is_array<decltype(node)>) text << node;
   });
   return printable_line(text.str(), kLongestText);
-}
-
-/// Insertions, deletions and replacements that turn one text into the other (Levenshtein).
-std::size_t edits_between(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t before = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = before + (a[i - 1] == b[j - 1] ? 0 : 1);
-      before = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, replaced}));
-    }
-  }
-  return row.back();
-}
-
-/// The known key that was most likely meant; empty if none is near.
-std::string likely_key(const std::string& key, const std::set<std::string>& known) {
-  std::string likely;
-  std::size_t least = kMaxEdits + 1;
-  for (const std::string& candidate : known) {
-    if (key.size() > candidate.size() + kMaxEdits) continue;
-    const std::size_t edits = edits_between(key, candidate);
-    if (edits >= least || edits >= candidate.size()) continue;
-    likely = candidate;
-    least = edits;
-  }
-  return likely;
 }
 
 bool is_control(char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7F'; }
@@ -295,7 +265,7 @@ std::vector<std::string> TomlFields::keys() const {
 void TomlFields::finish() const {
   for (const std::string& key : keys()) {
     if (known_.contains(key)) continue;
-    const std::string meant = likely_key(key, known_);
+    const std::string meant = nearest_word(key, known_);
     refuse(key, source_.kind + ": unknown key" + (meant.empty() ? "" : "; use " + meant));
   }
 }

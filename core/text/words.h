@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <initializer_list>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,5 +54,8 @@ inline std::vector<std::string_view> split(std::string_view text, char separator
     text.remove_prefix(end + 1);
   }
 }
+
+/// The known word that was most likely meant by a mistyped one; empty if none is near.
+std::string nearest_word(const std::string& word, const std::set<std::string>& known);
 
 }  // namespace lensforge

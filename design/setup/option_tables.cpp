@@ -95,14 +95,17 @@ void describe_front(Description& d, LightOptions& o) {
 
 void describe(Description& d, DesignOptions& o) {
   d.length("--width", o.width, Limits::between(kMinLensWidth, kMaxLensWidth),
-           "lens width; the height follows the picture");
+           "lens width; the height follows the picture")
+      .essential = true;
   d.length("--focal", o.focal_length, Limits::above(0, kMaxFocalLength),
-           "z of the picture's centre: distance from the flat face to the wall");
+           "z of the picture's centre: distance from the flat face to the wall")
+      .essential = true;
   d.number("--ior", o.ior, Limits::between(kMinIor, kMaxIor), "", "refractive index of the lens");
   d.length("--thickness", o.thickness, Limits::between(kMinThickness, kMaxThickness),
            "minimum thickness of the lens");
   d.whole("--pixels", o.pixels, Limits::between(kMinPixels, kMaxImageSide),
-          "longer side of the working picture; at most the source picture's");
+          "longer side of the working picture; at most the source picture's")
+      .essential = true;
   d.number("--mesh-ratio", o.mesh_ratio, Limits::between(0.25, 8), "",
            "mesh vertices per pixel side");
   d.whole("--levels", o.levels, Limits::between(1, 16),
@@ -111,7 +114,8 @@ void describe(Description& d, DesignOptions& o) {
           "rounds at each resolution; three make one, with four fifths of their iterations, but "
           "for --model facet");
   d.word("--quality", o.iterations, {{"draft", 20}, {"standard", 100}, {"paper", 300}},
-         "maximum iterations of one round: 20, 100 or 300");
+         "maximum iterations of one round: 20, 100 or 300")
+      .essential = true;
   d.whole("--transport-rounds", o.transport_rounds, Limits::between(0, 1000),
           "rounds that begin with optimal transport; 0 starts from a flat surface");
   d.without("--no-rendering-guided", o.rendering_guided,

@@ -48,7 +48,7 @@ TEST(ManualPage, HasEveryOptionAsTheTablesHaveIt) {
 
 TEST(ManualPage, HelpAndManualHaveTheSameOptions) {
   for (const char* command : kCommands) {
-    const std::string help = printed({command, "--help"});
+    const std::string help = printed({command, "--help-all"});
     const std::string manual = "\n" + printed({command, "--help-man"});
     for (std::size_t at = manual.find("\n.It Fl -"); at != std::string::npos;
          at = manual.find("\n.It Fl -", at + 1)) {

@@ -270,7 +270,7 @@ void BaseSet::ask_for_options(const fs::path& folder) {
   };
   files_["workshop.toml"] = printed({"cam", "lens", "--show-workshop"});
   for (const std::string& command : command_names()) {
-    std::istringstream help(printed({command, "--help"}));
+    std::istringstream help(printed({command, "--help-all"}));
     for (std::string line; std::getline(help, line);) {
       if (line.starts_with("  --")) options_[command].push_back(known_option(line));
     }

@@ -74,7 +74,7 @@ std::string shown(const std::string& text) {
 }
 
 bool shows_json(const Command& command, const Ending& ending) {
-  for (const char* other : {"--help", "-h", "--version", "--show-workshop"}) {
+  for (const char* other : {"--help", "--help-all", "-h", "--version", "--show-workshop"}) {
     if (ending.exit_code == 0 && has_option(command, other)) return false;
   }
   const bool asked = command.json_by_config || has_option(command, "--json");

@@ -38,8 +38,24 @@ TEST_F(Usage, HelpOfEveryCommandIsPrintedOnStdout) {
 TEST_F(Usage, HelpNamesDefaultsAndUnits) {
   const std::string help = run({"design", "--help"}).out;
   EXPECT_THAT(help, HasSubstr("--width MM = 100"));
-  EXPECT_THAT(help, HasSubstr("--ior NUMBER = 1.49"));
   EXPECT_THAT(help, HasSubstr("--quality draft|standard|paper = standard"));
+  EXPECT_THAT(run({"design", "--help-all"}).out, HasSubstr("--ior NUMBER = 1.49"));
+}
+
+TEST_F(Usage, HelpShowsWhatMattersAndHelpAllTheRest) {
+  for (const std::string command : {"design", "cam"}) {
+    const std::string some = run({command, "--help"}).out;
+    const std::string all = run({command, "--help-all"}).out;
+    EXPECT_THAT(some, HasSubstr("Example:\n  lensforge " + command + " "));
+    EXPECT_THAT(some, HasSubstr("--help-all lists "));
+    EXPECT_LT(std::count(some.begin(), some.end(), '\n'), 32);
+    EXPECT_GT(std::count(all.begin(), all.end(), '\n'), 50);
+  }
+  EXPECT_EQ(run({"view", "--help-all"}).out, run({"view", "--help"}).out);
+}
+
+TEST_F(Usage, ShortOutIsTheSameOption) {
+  expect_refusal(run({"design", "missing.png", "-o", path("lens")}), 2, {"missing.png"});
 }
 
 TEST_F(Usage, VersionIsOneLine) {
@@ -52,7 +68,9 @@ TEST_F(Usage, VersionIsOneLine) {
 
 TEST_F(Usage, NoCommandIsRefused) { expect_refusal(run({}), 2, {"no command"}); }
 
-TEST_F(Usage, UnknownCommandIsRefused) { expect_refusal(run({"desing"}), 2, {"desing"}); }
+TEST_F(Usage, UnknownCommandIsRefused) {
+  expect_refusal(run({"desing"}), 2, {"desing", "did you mean design?"});
+}
 
 TEST_F(Usage, MissingArgumentsAreRefused) {
   expect_refusal(run({"design"}), 2, {"required"});
@@ -63,7 +81,11 @@ TEST_F(Usage, MissingArgumentsAreRefused) {
   expect_refusal(run({"info"}), 2, {"SOURCE"});
 }
 
-TEST_F(Usage, UnknownOptionIsRefused) { expect_option_refused({"--widht", "5"}, {"--widht"}); }
+TEST_F(Usage, UnknownOptionIsRefused) {
+  expect_option_refused({"--widht", "5"}, {"--widht", "did you mean --width?"});
+  expect_option_refused({"--widht=5"}, {"--widht=5", "did you mean --width?"});
+  expect_option_refused({"--colour"}, {"--colour", "design --help lists the options"});
+}
 
 TEST_F(Usage, SecondValueIsRefused) {
   expect_option_refused({"--width", "50", "--width", "60"}, {"--width"});
