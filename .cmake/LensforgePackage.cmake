@@ -5,7 +5,8 @@ include(CMakePackageConfigHelpers)
 
 set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/lensforge")
 configure_package_config_file("${CMAKE_CURRENT_LIST_DIR}/lensforgeConfig.cmake.in"
-  "${CMAKE_BINARY_DIR}/lensforgeConfig.cmake" INSTALL_DESTINATION "${package_folder}")
+  "${CMAKE_BINARY_DIR}/lensforgeConfig.cmake" INSTALL_DESTINATION "${package_folder}"
+  PATH_VARS LENSFORGE_MODULE_FOLDER)
 write_basic_package_version_file("${CMAKE_BINARY_DIR}/lensforgeConfigVersion.cmake"
   COMPATIBILITY SameMinorVersion)
 install(FILES

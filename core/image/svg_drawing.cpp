@@ -23,6 +23,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_outline.h"
+#include "core/image/pictures_module.h"
 #include "core/image/svg_support.h"
 #include "core/image/transfer.h"
 #include "core/io/files.h"
@@ -144,7 +145,7 @@ std::string_view first_element(std::string_view text) {
 
 }  // namespace
 
-bool is_svg(std::istream& file) {
+bool pictures_module::is_svg(std::istream& file) {
   std::string head(kHeadBytes, '\0');
   file.clear();
   file.seekg(0);
@@ -375,7 +376,7 @@ ChildLimits limits_for(int longer_side) {
 
 }  // namespace
 
-SvgPicture draw_svg(const fs::path& path, int longer_side, const RunControl& run) {
+SvgPicture pictures_module::draw_svg(const fs::path& path, int longer_side, const RunControl& run) {
   const auto work = [&](const RunControl&) {
     // Each thread of librsvg's filters uses address space, which is limited.
     if (std::thread::hardware_concurrency() > kMaxThreads) {

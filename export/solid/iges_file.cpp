@@ -20,7 +20,7 @@
 #include "core/io/files.h"
 #include "core/text/printable.h"
 #include "export/solid/opencascade_io.h"
-#include "export/solid/spline_solid.h"
+#include "export/solid/solids_module.h"
 
 namespace lensforge {
 namespace {
@@ -208,7 +208,7 @@ void check_parameters(const Sections& sections, const Refusal& refuse) {
 
 }  // namespace
 
-std::int64_t check_iges(std::string_view content, const std::string& name) {
+std::int64_t solids_module::check_iges(std::string_view content, const std::string& name) {
   const Refusal refuse(name);
   check_first_line(content, refuse);
   const Sections sections = split(content, refuse);
@@ -267,8 +267,8 @@ SolidContent write_beside(const SplineNet& net, const StepHeader& header, const 
 
 }  // namespace
 
-SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs::path& path,
-                        const RunControl& control) {
+SolidContent solids_module::write_iges(const SplineNet& net, const StepHeader& header,
+                                       const fs::path& path, const RunControl& control) {
   SolidContent content;
   write_whole_file(path, [&](const fs::path& beside) {
     content = write_guarded(
@@ -278,7 +278,7 @@ SolidContent write_iges(const SplineNet& net, const StepHeader& header, const fs
   return content;
 }
 
-SolidContent inspect_iges(const fs::path& path, const RunControl& control) {
+SolidContent solids_module::inspect_iges(const fs::path& path, const RunControl& control) {
   const auto inspect = [&](const RunControl& inner) {
     const std::int64_t entities = check_iges(read_whole_file(path, kMaxSolidBytes), path.string());
     SolidContent content = inspect_shape(read_iges_shape(path, inner));

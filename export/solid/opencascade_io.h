@@ -3,15 +3,20 @@
 
 #include <STEPControl_Reader.hxx>
 #include <TCollection_HAsciiString.hxx>
+#include <TopoDS_Face.hxx>
 #include <TopoDS_Shape.hxx>
+#include <TopoDS_Solid.hxx>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/compute/executor.h"
 #include "export/solid/step_file.h"
+#include "export/spline/spline_net.h"
 
 /// Reading and writing of solids in any format. OpenCASCADE crashes on some broken files and never
 /// ends on others; it therefore reads files that are not our own in a child process. Its types are
@@ -69,5 +74,15 @@ void require_read_back(const SolidContent& content, double volume,
 
 /// Reason for which the system refused the last write.
 std::string last_system_error();
+
+/// An OpenCASCADE solid and the names of its faces.
+struct NamedSolid {
+  TopoDS_Solid solid;
+  std::vector<std::pair<TopoDS_Face, std::string>> names;
+};
+
+/// Returns the solid between a net and the face below it; neighbouring faces share their edges.
+/// Defined in spline_solid.cpp.
+NamedSolid make_spline_solid(const SplineNet& net);
 
 }  // namespace lensforge

@@ -45,6 +45,7 @@
 #include "core/sandbox/child_work.h"
 #include "core/spline/control_net.h"
 #include "export/solid/opencascade_io.h"
+#include "export/solid/solids_module.h"
 #include "export/solid/step_file.h"
 
 namespace lensforge {
@@ -539,8 +540,9 @@ std::string surface_bytes(const Work& work) {
 
 }  // namespace
 
-SolidSurface read_solid_surface(const fs::path& path, double points, const Executor& executor,
-                                const RunControl& control) {
+SolidSurface solids_module::read_solid_surface(const fs::path& path, double points,
+                                               const Executor& executor,
+                                               const RunControl& control) {
   check_part21(read_whole_file(path, kMaxSolidBytes), path.string());
   const int threads = executor.concurrency();
   const std::string result = read_guarded(
@@ -680,7 +682,7 @@ SurfaceMesh tessellated(const fs::path& path, const RunControl& control) {
 
 }  // namespace
 
-SurfaceMesh read_solid_mesh(const fs::path& path, const RunControl& control) {
+SurfaceMesh solids_module::read_solid_mesh(const fs::path& path, const RunControl& control) {
   check_part21(read_whole_file(path, kMaxSolidBytes), path.string());
   const std::string bytes = read_guarded(
       path,
@@ -700,3 +702,18 @@ SurfaceMesh read_solid_mesh(const fs::path& path, const RunControl& control) {
 }
 
 }  // namespace lensforge
+
+/// The only function that the module exports.
+extern "C" const lensforge::ModuleHead* lensforge_solids() {
+  namespace module = lensforge::solids_module;
+  static const module::Table table{.head = {lensforge::module_mark(), sizeof(module::Table)},
+                                   .check_part21 = module::check_part21,
+                                   .write_step = module::write_step,
+                                   .inspect_step = module::inspect_step,
+                                   .check_iges = module::check_iges,
+                                   .write_iges = module::write_iges,
+                                   .inspect_iges = module::inspect_iges,
+                                   .read_solid_surface = module::read_solid_surface,
+                                   .read_solid_mesh = module::read_solid_mesh};
+  return &table.head;
+}

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/solid/spline_solid.h"
-
 #include <BRepBuilderAPI_MakeEdge.hxx>
 #include <BRepBuilderAPI_MakeFace.hxx>
 #include <BRep_Builder.hxx>
@@ -45,6 +43,7 @@
 
 #include "core/error.h"
 #include "core/optics/front.h"
+#include "export/solid/opencascade_io.h"
 #include "export/spline/net_outline.h"
 
 namespace lensforge {

@@ -23,7 +23,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "export/solid/opencascade_io.h"
-#include "export/solid/spline_solid.h"
+#include "export/solid/solids_module.h"
 
 namespace lensforge {
 namespace {
@@ -204,7 +204,7 @@ class Part21Scanner {
 
 }  // namespace
 
-std::int64_t check_part21(std::string_view content, const std::string& name) {
+std::int64_t solids_module::check_part21(std::string_view content, const std::string& name) {
   return Part21Scanner(content, name).check();
 }
 
@@ -259,8 +259,9 @@ SolidContent write_beside(const SplineNet& net, const StepHeader& header, StepSc
 
 }  // namespace
 
-SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
-                        const fs::path& path, const RunControl& control) {
+SolidContent solids_module::write_step(const SplineNet& net, const StepHeader& header,
+                                       StepSchema schema, const fs::path& path,
+                                       const RunControl& control) {
   SolidContent content;
   write_whole_file(path, [&](const fs::path& beside) {
     content = write_guarded(path, control, [&](const RunControl&) {
@@ -271,7 +272,7 @@ SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSche
   return content;
 }
 
-SolidContent inspect_step(const fs::path& path, const RunControl& control) {
+SolidContent solids_module::inspect_step(const fs::path& path, const RunControl& control) {
   const std::int64_t entities = check_part21(read_whole_file(path, kMaxSolidBytes), path.string());
   SolidContent content = content_of(read_guarded(
       path, [&](const RunControl& c) { return bytes_of(inspect_shape(read_step_shape(path, c))); },

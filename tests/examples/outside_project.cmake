@@ -41,5 +41,19 @@ run("${CMAKE_COMMAND}" --build "${work}/build")
 
 run("${work}/build/design_and_export" "${BUILD}/pictures/rings.png" "${work}/lens")
 require("${work}/lens/lens.json" "${work}/lens/surface.ply" "${work}/lens/lens.stl")
-run("${prefix}/bin/lensforge" info "${work}/lens")
+
+# The installation works wherever it is moved; without its modules a command names the one that is missing.
+file(RENAME "${prefix}" "${work}/moved")
+run("${work}/moved/bin/lensforge" info "${work}/lens")
+file(GLOB_RECURSE modules "${work}/moved/*/lensforge-*.so")
+list(LENGTH modules count)
+if(NOT count EQUAL 2)
+  message(FATAL_ERROR "two modules are installed, not: ${modules}")
+endif()
+file(REMOVE ${modules})
+execute_process(COMMAND "${work}/moved/bin/lensforge" info "${work}/lens"
+  RESULT_VARIABLE status ERROR_VARIABLE text)
+if(NOT status EQUAL 1 OR NOT text MATCHES "^lensforge: the file lensforge-pictures.so is missing[^\n]*\n$")
+  message(FATAL_ERROR "without modules a command ends with ${status}: ${text}")
+endif()
 file(REMOVE_RECURSE "${work}")

@@ -34,7 +34,7 @@ if(NOT count EQUAL 1)
 endif()
 
 run(dpkg-deb --field "${packages}" Depends)
-foreach(library libopenimageio librsvg libc6 libstdc++6 libtbb)
+foreach(library libopenimageio librsvg libocct libc6 libstdc++6 libtbb)
   string(FIND "${output}" "${library}" found)
   if(found EQUAL -1)
     message(FATAL_ERROR "the package does not depend on ${library}: ${output}")
@@ -42,7 +42,8 @@ foreach(library libopenimageio librsvg libc6 libstdc++6 libtbb)
 endforeach()
 
 run(dpkg -x "${packages}" "${root}")
-foreach(name bin/lensforge share/man/man1/lensforge.1
+foreach(name bin/lensforge lib/lensforge/lensforge-pictures.so lib/lensforge/lensforge-solids.so
+    share/man/man1/lensforge.1
     share/bash-completion/completions/lensforge share/zsh/vendor-completions/_lensforge
     share/fish/vendor_completions.d/lensforge.fish)
   if(NOT EXISTS "${root}/usr/${name}")
@@ -56,6 +57,7 @@ endif()
 run("${root}/usr/bin/lensforge" --version)
 run("${root}/usr/bin/lensforge" design "${BUILD}/pictures/rings.png" --out "${work}/lens"
   --pixels 16 --rounds 1 --quiet)
+run("${root}/usr/bin/lensforge" export "${work}/lens" --out "${work}/lens.step" --quiet)
 run("${root}/usr/bin/lensforge" info "${work}/lens")
 if(PYTHON)
   set(modules "${root}/usr/lib/python3/dist-packages")
