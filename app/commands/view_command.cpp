@@ -10,8 +10,8 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/text/lower_case.h"
 #include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge::app {
 namespace {

@@ -16,7 +16,7 @@
 #include "core/compute/executor.h"
 #include "core/compute/work_estimate.h"
 #include "core/io/lens_folder.h"
-#include "core/text/lower_case.h"
+#include "core/text/words.h"
 
 /// The frame of all commands, with output folder and result. File types by extension.
 namespace lensforge::app {

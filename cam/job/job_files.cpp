@@ -21,7 +21,6 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/mesh/mesh_files.h"
-#include "core/text/lower_case.h"
 #include "core/text/words.h"
 #include "machine/gcode/program_seal.h"
 

@@ -13,7 +13,6 @@
 #include "cam/post/builtin_posts.h"
 #include "core/error.h"
 #include "core/schema/toml.h"
-#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 #include "machine/gcode/gcode_interpreter.h"

@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include "core/image/transfer.h"
-#include "core/text/lower_case.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

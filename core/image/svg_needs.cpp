@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "core/image/svg_support.h"
-#include "core/text/lower_case.h"
 #include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

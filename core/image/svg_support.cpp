@@ -12,8 +12,8 @@
 #include <cstdlib>
 
 #include "core/error.h"
-#include "core/text/lower_case.h"
 #include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

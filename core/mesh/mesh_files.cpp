@@ -17,9 +17,9 @@
 #include "core/io/files.h"
 #include "core/mesh/mesh_readers.h"
 #include "core/mesh/surface_mesh.h"
-#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

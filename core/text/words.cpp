@@ -26,6 +26,11 @@ std::size_t edits_between(std::string_view a, std::string_view b) {
 
 }  // namespace
 
+std::string lower_case(std::string text) {
+  for (char& c : text) c = lower(c);
+  return text;
+}
+
 std::string nearest_word(const std::string& word, const std::set<std::string>& known) {
   std::string nearest;
   std::size_t least = kMaxEdits + 1;

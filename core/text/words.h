@@ -10,6 +10,13 @@
 
 namespace lensforge {
 
+/// The text with A to Z as a to z and all other bytes unchanged, in any locale.
+std::string lower_case(std::string text);
+
+/// A to Z for a to z, and the other way round; all other bytes unchanged.
+constexpr char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
+constexpr char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
 /// Concatenates the texts.
 inline std::string joined(std::initializer_list<std::string_view> texts) {
   std::string all;

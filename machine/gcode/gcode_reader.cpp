@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <ios>
 
-#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

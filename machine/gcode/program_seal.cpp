@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/text/lower_case.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -12,7 +12,6 @@
 
 #include "core/error.h"
 #include "core/schema/toml.h"
-#include "core/text/lower_case.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "core/text/lower_case.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 
