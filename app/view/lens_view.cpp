@@ -38,6 +38,7 @@
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/render.h"
 #include "machine/gcode.h"
 #include "machine/gcode/gcode_dialect.h"
