@@ -31,18 +31,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const Choices<ExportFormat>& formats() {
-  using F = ExportFormat;
-  static const Choices<ExportFormat> words{{"extension", F::kByExtension},
-                                           {"step", F::kStep},
-                                           {"iges", F::kIges},
-                                           {"stl", F::kStl},
-                                           {"obj", F::kObj},
-                                           {"ply", F::kPly},
-                                           {"3mf", F::k3mf},
-                                           {"glb", F::kGlb},
-                                           {"exr", F::kExr},
-                                           {"png", F::kPng}};
+constexpr const char* kStep = "step";
+constexpr const char* kIges = "iges";
+constexpr const char* kExr = "exr";
+constexpr const char* kPng = "png";
+
+Choices<ExportFormat> formats() {
+  Choices<ExportFormat> words;
+  const auto add = [&words](const char* word) { words.emplace_back(word, word); };
+  for (const char* word : {kByExtension, kStep, kIges}) add(word);
+  for (const MeshFormat& format : mesh_formats()) add(format.word);
+  for (const char* word : {kExr, kPng}) add(word);
   return words;
 }
 
@@ -64,9 +63,13 @@ void require_author(const std::string& author) {
 
 void describe(Description& d, ExportOptions& o) {
   d.flag("--force", o.force, "replace a file that lensforge did not write");
+  std::vector<std::string> meshes;
+  for (const MeshFormat& format : mesh_formats()) {
+    meshes.push_back(joined({format.word, *format.note == '\0' ? "" : " ", format.note}));
+  }
   d.word("--format", o.format, formats(),
-         "solid as step or iges; closed mesh as stl (binary), obj, ply or 3mf; clear part for "
-         "scenes as glb; height map as exr (32-bit, mm) or png (16-bit grey)");
+         "solid as step or iges; closed mesh as " + joined(meshes, ", ") +
+             "; height map as exr (32-bit, mm) or png (16-bit grey)");
   d.whole("--pixels", o.pixels, Limits::between(2, kMaxImageSide), "longer side of a height map");
   d.length("--tolerance", o.tolerance, Limits::between(1e-6, 1.0),
            "step, iges: largest distance of the splines from the smooth surface");
@@ -80,31 +83,20 @@ void describe(Description& d, ExportOptions& o) {
   d.text("--author", o.author, "NAME", "step, iges: author in the header; printable ASCII");
 }
 
-std::string word_of(ExportFormat format) {
-  for (const auto& [word, meaning] : formats()) {
-    if (meaning == format) return word;
-  }
-  return {};
-}
+bool is_height_map(const ExportFormat& format) { return format == kExr || format == kPng; }
 
-bool is_height_map(ExportFormat format) {
-  return format == ExportFormat::kExr || format == ExportFormat::kPng;
-}
-
-bool is_spline_solid(ExportFormat format) {
-  return format == ExportFormat::kStep || format == ExportFormat::kIges;
-}
+bool is_spline_solid(const ExportFormat& format) { return format == kStep || format == kIges; }
 
 ExportFormat export_format(const ExportOptions& options, const fs::path& out) {
-  if (options.format != ExportFormat::kByExtension) return options.format;
+  if (options.format != kByExtension) return options.format;
   const std::string extension = lower_case(out.extension().string());
-  if (extension == ".stp") return ExportFormat::kStep;
-  if (extension == ".igs") return ExportFormat::kIges;
+  if (extension == ".stp") return kStep;
+  if (extension == ".igs") return kIges;
   std::string known;
   for (const auto& [word, meaning] : formats()) {
-    if (meaning == ExportFormat::kByExtension) continue;
+    if (meaning == kByExtension) continue;
     if (extension == "." + word) return meaning;
-    known += (known.empty() ? "." : ", .") + word;
+    known = with_word(std::move(known), "." + word);
   }
   throw InputError("--out " + out.string() + ": must end in one of " + known +
                    ", or --format must say what to write");
@@ -287,37 +279,30 @@ SplineSolid write_splines(const Job& job) {
   solid.mesh_volume = mesh_volume;
   const StepHeader header = header_of(job);
   job.begin_writing();
-  solid.content = job.format == ExportFormat::kIges
+  solid.content = job.format == kIges
                       ? write_iges(solid.net, header, job.out, job.control)
                       : write_step(solid.net, header, job.options.schema, job.out, job.control);
   return solid;
 }
 
-void write_scene(const Job& job, const SampledSurface& surface, const SurfaceMesh& solid) {
-  const Lens& lens = job.source.lens;
-  const std::int64_t triangles = surface.mesh.triangle_count();
-  GltfPart part{.solid = solid,
-                .normals = surface.normals,
-                .surface_triangles = triangles,
-                .curved_back = lens.setup.front ? triangles : 0,
-                .ior = lens.setup.ior,
-                .mirror = !traits(lens.setup.body).transmits};
-  write_glb(part, traits(lens.setup.body).name, job.out);
-}
-
 MeshSolid write_mesh(const Job& job) {
   job.control.report({"closed mesh", 0.0, 0.0, ""});
-  const SampledSurface surface = part_of(job);
-  const SurfaceMesh solid =
-      closed_solid(surface.mesh, job.source.file.string(), job.source.lens.setup.front);
+  const Lens& lens = job.source.lens;
+  SampledSurface surface = part_of(job);
+  const std::int64_t triangles = surface.mesh.triangle_count();
+  const ClosedMesh mesh{
+      .solid = closed_solid(surface.mesh, job.source.file.string(), lens.setup.front),
+      .normals = std::move(surface.normals),
+      .surface_triangles = triangles,
+      .curved_back = lens.setup.front ? triangles : 0,
+      .ior = lens.setup.ior,
+      .mirror = !traits(lens.setup.body).transmits};
   const std::string title = program_mark() + " lens, millimetres";
   job.begin_writing();
-  if (job.format == ExportFormat::kStl) write_stl(solid, title, job.out);
-  if (job.format == ExportFormat::kObj) write_obj(solid, title, job.out);
-  if (job.format == ExportFormat::kPly) write_ply(solid, job.out);
-  if (job.format == ExportFormat::k3mf) write_3mf(solid, title, job.out);
-  if (job.format == ExportFormat::kGlb) write_scene(job, surface, solid);
-  return {static_cast<std::int64_t>(solid.triangle_count()), enclosed_volume(solid)};
+  for (const MeshFormat& format : mesh_formats()) {
+    if (job.format == format.word) format.write(mesh, title, job.out);
+  }
+  return {static_cast<std::int64_t>(mesh.solid.triangle_count()), enclosed_volume(mesh.solid)};
 }
 
 /// Reports the cost of a height map. @throw InputError if there is no room for it.
@@ -325,8 +310,7 @@ void announce_heights(const Job& job) {
   const auto work = [&](double side) {
     const GridShape shape =
         height_map_shape(job.source.lens.setup.lens_size, static_cast<int>(side));
-    return height_map_work(double{1} * shape.columns * shape.rows,
-                           job.format == ExportFormat::kPng);
+    return height_map_work(double{1} * shape.columns * shape.rows, job.format == kPng);
   };
   job.announce(require_room_for(work, {"--pixels", 1.0 * job.options.pixels}, job.folder()));
 }
@@ -339,7 +323,7 @@ HeightMap write_heights(const Job& job) {
   HeightMap map{
       {heights.columns(), heights.rows()}, surface->box().sizes().x() / heights.columns(), {}};
   job.begin_writing();
-  if (job.format == ExportFormat::kExr) {
+  if (job.format == kExr) {
     write_image(heights, job.out, job.control);
   } else {
     map.scale = write_grey_relief(heights, job.out, job.executor, job.control);

@@ -20,13 +20,17 @@ namespace lensforge {
 
 class Description;
 
-/// File formats of an export.
-enum class ExportFormat { kByExtension, kStep, kIges, kStl, kObj, kPly, k3mf, kGlb, kExr, kPng };
+/// Word of a file format, as for --format: "step" and "iges" are solids of splines, "exr" and "png"
+/// height maps, those of mesh_formats() closed meshes.
+using ExportFormat = std::string;
+
+/// The format that the file's extension names.
+inline constexpr const char* kByExtension = "extension";
 
 /// Options for writing a lens as a file for other programs.
 struct ExportOptions {
   bool force = false;  ///< Replace a file that lensforge did not write.
-  ExportFormat format = ExportFormat::kByExtension;
+  ExportFormat format = kByExtension;
   int pixels = 1024;  ///< Longer side of a height map.
   // Solids of splines only.
   double tolerance = FitOptions{}.tolerance;                ///< mm
@@ -39,11 +43,8 @@ struct ExportOptions {
 /// Every option of an export.
 void describe(Description& d, ExportOptions& o);
 
-/// "step", "iges", "stl", "obj", "ply", "3mf", "glb", "exr" or "png".
-std::string word_of(ExportFormat format);
-
-bool is_height_map(ExportFormat format);
-bool is_spline_solid(ExportFormat format);
+bool is_height_map(const ExportFormat& format);
+bool is_spline_solid(const ExportFormat& format);
 
 /// The format that the options or the file's extension ask for. @throw InputError if neither does.
 ExportFormat export_format(const ExportOptions& options, const std::filesystem::path& out);
@@ -104,7 +105,7 @@ struct HeightMap {
 
 /// Result of an export; one of `splines`, `mesh` and `heights` is set.
 struct ExportResult {
-  ExportFormat format = ExportFormat::kByExtension;
+  ExportFormat format;
   ModelMetrics metrics;  ///< Metrics of the mesh's projected pictures.
   std::optional<SplineSolid> splines;
   std::optional<MeshSolid> mesh;

@@ -164,18 +164,18 @@ void describe(Description& d, ExportSettings& settings) {
   describe(d, settings.options);
 }
 
-void require_fitting_options(const OptionSet& options, ExportFormat format) {
+void require_fitting_options(const OptionSet& options, const ExportFormat& format) {
   if (options.given("--pixels") && !is_height_map(format)) {
-    throw InputError("--pixels: is for height maps (exr, png), not for " + word_of(format));
+    throw InputError("--pixels: is for height maps (exr, png), not for " + format);
   }
   constexpr std::array kOfSplines{"--tolerance", "--normal-tolerance", "--max-points", "--schema",
                                   "--author"};
   for (const char* name : kOfSplines) {
     if (options.given(name) && !is_spline_solid(format)) {
-      throw InputError(std::string(name) + ": is for step and iges, not for " + word_of(format));
+      throw InputError(std::string(name) + ": is for step and iges, not for " + format);
     }
   }
-  if (format == ExportFormat::kIges && options.given("--schema")) {
+  if (format == "iges" && options.given("--schema")) {
     throw InputError("--schema: is for step, not for iges");
   }
 }
@@ -195,7 +195,7 @@ CommandResult run(CommandFrame& frame, ExportSettings& settings) {
       export_lens(source, settings.out, settings.options, frame.executor(), frame.control(), hooks);
   CommandResult report = export_report(result);
   report.json["out"] = settings.out;
-  report.json["format"] = word_of(result.format);
+  report.json["format"] = result.format;
   report.json["bytes"] = std::filesystem::file_size(settings.out);
   report.text = settings.out + "\n" + report.text;
   if (!result.within_tolerance()) {

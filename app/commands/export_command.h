@@ -21,7 +21,7 @@ struct ExportSettings {
 void describe(Description& d, ExportSettings& settings);
 
 /// @throw InputError naming an option that was given but does not apply to the format.
-void require_fitting_options(const OptionSet& options, ExportFormat format);
+void require_fitting_options(const OptionSet& options, const ExportFormat& format);
 
 /// What was written, without the file itself.
 CommandResult export_report(const ExportResult& result);

@@ -367,8 +367,11 @@ std::optional<Description> describe(const fs::path& path, CommandFrame& frame) {
     frame.begin_file();
     return describe_solid(path, iges, frame.control());
   }
-  if (has_extension(path, {".3mf"})) return describe_package(inspect_3mf(path));
-  if (has_extension(path, {".glb"})) return describe_package(inspect_glb(path));
+  for (const MeshFormat& format : mesh_formats()) {
+    if (format.inspect != nullptr && has_extension(path, {joined({".", format.word}).c_str()})) {
+      return describe_package(format.inspect(path));
+    }
+  }
   if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return std::nullopt;
   Description d{{{{"kind", "mesh"}}}};
   describe_mesh(d, read_mesh(path));

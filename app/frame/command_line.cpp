@@ -300,7 +300,7 @@ constexpr std::array kSubcommands{
     Subcommand{"coupon", coupon_command, "coupon --out DIR",
                "test piece that calibrates a workshop"},
     Subcommand{"export", export_command, "export DIR --out FILE",
-               "lens folder to .step, .iges, .stl, .obj, .ply, .3mf, .glb, height map"},
+               "lens folder to STEP, IGES, a closed mesh, a height map"},
     Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},
     Subcommand{"reflect", reflect_command, "reflect MESH --out DIR",
                "mesh to a shape that reflects light as wanted"},

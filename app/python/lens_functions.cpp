@@ -287,7 +287,7 @@ py::object export_file(const py::object& lens, const fs::path& out,
                        stopping_at(stop));
   });
   nlohmann::json report = app::export_report(result).json;
-  report["format"] = word_of(result.format);
+  report["format"] = result.format;
   report["within_tolerance"] = result.within_tolerance();
   return object_from(report);
 }

@@ -24,6 +24,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/schema/json.h"
 #include "core/text/printable.h"
@@ -409,7 +410,7 @@ void add_flat(const SurfaceMesh& solid, std::int64_t first, std::int64_t count, 
   }
 }
 
-Vertices vertices_of(const GltfPart& part) {
+Vertices vertices_of(const ClosedMesh& part) {
   Vertices all;
   const std::int64_t back = part.solid.triangle_count() - part.curved_back;
   add_smooth(part.solid, 0, part.surface_triangles, part.normals, all);
@@ -422,7 +423,7 @@ Vertices vertices_of(const GltfPart& part) {
   return all;
 }
 
-Json material_of(const GltfPart& part) {
+Json material_of(const ClosedMesh& part) {
   Json material{{"name", part.mirror ? "mirror" : "clear"},
                 {"pbrMetallicRoughness",
                  Json{{"metallicFactor", part.mirror ? 1.0 : 0.0}, {"roughnessFactor", 0.0}}}};
@@ -480,7 +481,7 @@ Json views_of(std::span<const Block> blocks) {
   return views;
 }
 
-Json description(const GltfPart& part, const std::string& title, const Vertices& all,
+Json description(const ClosedMesh& part, const std::string& title, const Vertices& all,
                  std::span<const Block> blocks, std::uint64_t buffer_bytes) {
   const Json primitive{
       {"attributes", Json{{"POSITION", 0}, {"NORMAL", 1}}}, {"indices", 2}, {"material", 0}};
@@ -507,7 +508,7 @@ void append(std::string& bytes, std::uint64_t number) {
 
 }  // namespace
 
-void write_glb(const GltfPart& part, const std::string& title, const fs::path& path) {
+void write_glb(const ClosedMesh& part, const std::string& title, const fs::path& path) {
   const Vertices all = vertices_of(part);
   const std::vector<Block> blocks{block_of(all.positions, kArrayBuffer),
                                   block_of(all.normals, kArrayBuffer),
@@ -654,5 +655,33 @@ MeshContent inspect_glb(const fs::path& path) {
   const json root = parse_json(glb_description(path), path.string());
   return GlbSurvey(root, path).content();
 }
+
+namespace {
+
+/// A format of the solid alone.
+template <auto write>
+void write_solid(const ClosedMesh& mesh, const std::string& title, const fs::path& path) {
+  write(mesh.solid, title, path);
+}
+
+void write_solid_ply(const ClosedMesh& mesh, const std::string&, const fs::path& path) {
+  write_ply(mesh.solid, path);
+}
+
+void write_scene(const ClosedMesh& mesh, const std::string&, const fs::path& path) {
+  write_glb(mesh, mesh.mirror ? "mirror" : "lens", path);
+}
+
+constexpr std::array kMeshFormats{
+    MeshFormat{"stl", "(binary)", write_solid<write_stl>, nullptr},
+    MeshFormat{"obj", "", write_solid<write_obj>, nullptr},
+    MeshFormat{"ply", "", write_solid_ply, nullptr},
+    MeshFormat{"3mf", "", write_solid<write_3mf>, inspect_3mf},
+    MeshFormat{"glb", "(clear part for scenes)", write_scene, inspect_glb},
+};
+
+}  // namespace
+
+std::span<const MeshFormat> mesh_formats() { return kMeshFormats; }
 
 }  // namespace lensforge

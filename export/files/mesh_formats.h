@@ -5,11 +5,13 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include "core/mesh/surface_mesh.h"
 
-/// Meshes in the formats that printers, CAM programs and viewers read; millimetres. Each file
+/// Meshes in the formats that printers, CAM programs and viewers read; millimetres. A new format is
+/// a row of mesh_formats(). Each file
 /// appears whole or not at all and contains its title as plain text. PLY and STL are in
 /// core/mesh/mesh_files.h.
 namespace lensforge {
@@ -25,9 +27,9 @@ void write_obj(const SurfaceMesh& mesh, const std::string& title,
 void write_3mf(const SurfaceMesh& mesh, const std::string& title,
                const std::filesystem::path& path);
 
-/// A solid for scenes in other programs.
-struct GltfPart {
-  SurfaceMesh solid;  ///< Closed, mm; the optical surface's triangles first (closed_solid()).
+/// A lens as a closed mesh, with its looks for scenes in other programs.
+struct ClosedMesh {
+  SurfaceMesh solid;         ///< mm; the optical surface's triangles first (closed_solid()).
   Eigen::Matrix3Xd normals;  ///< At the optical surface's vertices, which come first in the solid.
   std::int64_t surface_triangles = 0;
   /// Number of triangles at the solid's end that form a curved back, which is shaded smoothly.
@@ -41,7 +43,7 @@ struct GltfPart {
 /// KHR_materials_ior. Walls and a flat back are shaded flat, with their own normals. The file
 /// appears whole or not at all. @throw RunError if it cannot be written, or would be longer than 4
 /// GiB.
-void write_glb(const GltfPart& part, const std::string& title, const std::filesystem::path& path);
+void write_glb(const ClosedMesh& part, const std::string& title, const std::filesystem::path& path);
 
 /// Summary of a file of meshes, enough to identify it.
 struct MeshContent {
@@ -61,5 +63,17 @@ MeshContent inspect_3mf(const std::filesystem::path& path);
 /// Reads the description in a binary glTF file (glTF 2.0); its vertex data are not checked. @throw
 /// InputError if it is no such file, or holds no mesh.
 MeshContent inspect_glb(const std::filesystem::path& path);
+
+/// A file format for closed meshes.
+struct MeshFormat {
+  const char* word;  ///< For --format; also its extension.
+  const char* note;  ///< For the help, in brackets; may be empty.
+  void (*write)(const ClosedMesh& mesh, const std::string& title,
+                const std::filesystem::path& path);
+  /// Summary of a file; null if read_mesh() reads the format.
+  MeshContent (*inspect)(const std::filesystem::path& path);
+};
+
+std::span<const MeshFormat> mesh_formats();
 
 }  // namespace lensforge

@@ -48,7 +48,7 @@ TEST_F(ExportLens, ACallWritesTheSolidAndSaysHowGoodItIs) {
   ExportOptions options;
   options.tolerance = options.normal_tolerance = 0.01;
   const ExportResult result = write("lens.step", options);
-  EXPECT_EQ(result.format, ExportFormat::kStep);
+  EXPECT_EQ(result.format, "step");
   ASSERT_TRUE(result.splines.has_value());
   EXPECT_TRUE(result.within_tolerance());
   EXPECT_TRUE(result.splines->content.is_one_solid());

@@ -78,7 +78,7 @@ class GltfFile : public ::testing::Test {
 
   TempFolder folder_;
   SurfaceMesh surface_ = noisy_lens();
-  GltfPart part_;
+  ClosedMesh part_;
 };
 
 TEST_F(GltfFile, HoldsTheSolidInMetres) {

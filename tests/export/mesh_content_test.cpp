@@ -27,7 +27,7 @@ class MeshContentTest : public ::testing::Test {
   MeshContentTest() : solid_(closed_solid(surface_, "lens")) {}
 
   [[nodiscard]] fs::path glb() const {
-    GltfPart part;
+    ClosedMesh part;
     part.solid = solid_;
     part.normals = vertex_area_normals(surface_);
     part.surface_triangles = surface_.triangle_count();
