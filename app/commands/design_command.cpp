@@ -105,7 +105,7 @@ void require_wide_drawing(const Image& drawing, const DesignSettings& settings) 
       settings.target + ": is " + size_text(drawing.columns(), drawing.rows()) +
       " pixels with --pixels " + std::to_string(settings.design.pixels) +
       "; its shorter side needs at least " + std::to_string(kMinPixels) +
-      (possible ? "; --pixels " + std::to_string(static_cast<int>(std::ceil(least))) + " would do"
+      (possible ? "; --pixels " + std::to_string(static_cast<int>(std::ceil(least))) + " works"
                 : ": draw it less narrow"));
 }
 
@@ -309,7 +309,7 @@ int live_port(const std::string& text) {
   const auto [stop, error] = std::from_chars(text.data(), end, port);
   if (error == std::errc() && stop == end && port >= 0 && port <= kLargest) return port;
   throw InputError("--live " + printable_line(text) +
-                   ": must be a port, 1 to 65535, or 0 for a free one; 8080 would do");
+                   ": must be a port, 1 to 65535, or 0 for a free one; 8080 works");
 }
 
 /// Shows a running design to browsers on this machine. A thread of its own looks at what the design

@@ -94,7 +94,7 @@ void require_spectrum(const Scene& scene, const OptionSet& options,
                       const RenderArguments& arguments) {
   const OpticalSetup& setup = scene.render.setup;
   if (setup.spectrum.none() && options.given("--abbe")) {
-    throw InputError("--abbe: needs --wavelengths; --wavelengths 450,550,650 would do");
+    throw InputError("--abbe: needs --wavelengths; --wavelengths 450,550,650 works");
   }
   if (setup.spectrum.none()) return;
   if (!traits(setup.body).transmits) {

@@ -121,14 +121,14 @@ std::string outline_tool_advice(const CutSetup& setup, const ProgramChecks& chec
            free_length(one) >= thickness;
   });
   if (other != tools.end()) {
-    return joined({fault, "--outline-tool ", std::to_string(other->number), " would do"});
+    return joined({fault, "--outline-tool ", std::to_string(other->number), " works"});
   }
   if (thin.thickness < thickness && thin.thickness <= free_length(tool)) {
-    return joined({fault, thin.option, " would do"});
+    return joined({fault, thin.option, " works"});
   }
   return joined({fault, "a flat end mill with flutes of ",
                  trimmed_decimal(std::ceil(1e3 * thickness) / 1e3, 3),
-                 " mm and nothing wider below that would do"});
+                 " mm and nothing wider below that works"});
 }
 
 namespace {

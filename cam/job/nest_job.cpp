@@ -103,7 +103,7 @@ std::vector<Eigen::Vector2d> place_in_rows(const std::vector<NestItem>& items,
                    trimmed_decimal(sheet.gap, 2) + " mm apart and " +
                    trimmed_decimal(sheet.edge, 2) + " mm from its edge: " +
                    size_words({needed.x(), std::max(sheet.size.y(), on_step(rows.height))}) +
-                   " would do");
+                   " works");
 }
 
 namespace {

@@ -272,18 +272,18 @@ void require_outline_cut(const std::vector<Eigen::Vector2d>& outline, const Outl
   const Loop loop(offset_outline(outline, cut.tool.radius()).points);
   const Tabs tabs(loop, cut, blank);
   if (loop.length() < room_for_tab(cut) * cut.tabs.count) {
-    throw InputError(
-        "--tabs " + std::to_string(cut.tabs.count) + ": need " + number_text(room_for_tab(cut), 3) +
-        " mm each, for the tool to get down between them along its ramp of " +
-        number_text(cut.ramp_angle_deg) + " degrees, and the way around has " +
-        number_text(loop.length(), 3) + " mm; a lower --tab-height or --tabs 0 would do");
+    throw InputError("--tabs " + std::to_string(cut.tabs.count) + ": need " +
+                     number_text(room_for_tab(cut), 3) +
+                     " mm each, for the tool to get down between them along its ramp of " +
+                     number_text(cut.ramp_angle_deg) + " degrees, and the way around has " +
+                     number_text(loop.length(), 3) + " mm; a lower --tab-height or --tabs 0 works");
   }
   if (tabs.frame() < kTabFrame) {
     throw InputError(
         "--margin: a tab has " + number_text(std::max(0.0, tabs.frame()), 3) +
         " mm of the blank outside of the slot of tool " + std::to_string(cut.tool.number) +
         ": must have at least " + number_text(kTabFrame) + " mm; --margin " +
-        number_text(std::ceil(cut.tool.diameter + kTabFrame + 0.1)) + "mm would do, or --tabs 0");
+        number_text(std::ceil(cut.tool.diameter + kTabFrame + 0.1)) + "mm works, or --tabs 0");
   }
 }
 

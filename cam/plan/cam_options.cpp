@@ -118,7 +118,7 @@ void validate_front(const CamOptions& options, const OpticalSetup& setup) {
   refuse("stock.margin", margin,
          "the lens's front, a sphere of radius " + shortest_text(radius) +
              " mm, is too small for a blank of that margin; " +
-             decimal_text(std::floor(10.0 * most) / 10.0, 1) + " mm would do");
+             decimal_text(std::floor(10.0 * most) / 10.0, 1) + " mm works");
 }
 
 /// Fails before hours are spent on programs that the controller could not read.

@@ -123,7 +123,7 @@ bool fit(std::uint32_t compression, int bits) {
 
 void require_compression(std::uint32_t compression, std::uint32_t header, int bits) {
   require(compression != kJpeg && compression != kPng,
-          "it holds a JPEG or PNG picture; saved as that it would do");
+          "it holds a JPEG or PNG picture: save it in that format");
   const bool known = compression <= kBitFields || compression == kAlphaBitFields;
   require(known && !(header == kOs2Header && compression > kRle4),
           "its BMP compression " + std::to_string(compression) + " is not known");

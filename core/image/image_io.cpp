@@ -37,7 +37,7 @@ Background Background::parse(const std::string& text) {
   if (text == "white") return {kWhite};
   if (!is_hex_colour(text)) {
     throw InputError(std::string(kName) + " '" + text +
-                     "': must be black, white or #RRGGBB; #ffffff would do");
+                     "': must be black, white or #RRGGBB; #ffffff works");
   }
   Background result;
   for (std::size_t i = 0; i < 3; ++i)

@@ -164,7 +164,7 @@ DecodedPicture decode_in_child(
     return {std::move(taker).image(), std::move(text)};
   } catch (const ChildFailure& failure) {
     refuse_picture(path, std::string("is no picture that can be read: its decoder ") +
-                             failure.what() + "; saved anew as PNG it would do");
+                             failure.what() + "; save it as PNG");
   }
 }
 

@@ -389,8 +389,7 @@ SvgPicture pictures_module::draw_svg(const fs::path& path, int longer_side, cons
         run_in_child("drawing " + path.filename().string(), limits_for(longer_side), work, run));
   } catch (const ChildFailure& failure) {
     refuse_picture(path, std::string("cannot be drawn: the program that draws SVG ") +
-                             failure.what() +
-                             "; fewer or simpler elements would do, or the picture as PNG");
+                             failure.what() + "; use fewer or simpler elements, or a PNG picture");
   }
 }
 

@@ -42,7 +42,7 @@ Spectrum parse_spectrum(const std::string& text, const std::string& name) {
   const auto refuse = [&] {
     throw InputError(name + " " + text +
                      ": must be 2 to 5 rising numbers of nanometres from 380 to 780, with a power "
-                     "above 0 after a colon at each or at none; 450,550,650 would do");
+                     "above 0 after a colon at each or at none; 450,550,650 works");
   };
   const auto count = static_cast<int>(std::count(text.begin(), text.end(), ',')) + 1;
   const auto colons = static_cast<int>(std::count(text.begin(), text.end(), ':'));

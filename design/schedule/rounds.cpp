@@ -212,8 +212,8 @@ bool relax(const LevelSite& site, int coordinates, SurfaceMesh& mesh) {
                               problem.objective, options.thickness},
                              site.task.executor);
   const std::string advice =
-      focal_length ? "--focal " + number_text(*focal_length) + "mm would do"
-                   : "no focal length up to " + number_text(kMaxFocalLength) + " mm would do";
+      focal_length ? "--focal " + number_text(*focal_length) + "mm works"
+                   : "no focal length up to " + number_text(kMaxFocalLength) + " mm works";
   throw InputError("--focal " + number_text(options.focal_length) +
                    ": no lens of this width and index bends the light so far in so short a "
                    "distance; " +
@@ -227,10 +227,11 @@ bool relax(const LevelSite& site, int coordinates, SurfaceMesh& mesh) {
   const bool front = task.setup.front.has_value();
   const std::string given =
       front ? "--front" : "--screen-tilt " + number_text(tilt.x()) + "," + number_text(tilt.y());
-  throw InputError(given +
-                   ": light of the surface that designs start from is reflected totally or passes "
-                   "the screen by; " +
-                   (front ? "--front flat" : "--screen-tilt 0,0") + " would do");
+  throw InputError(
+      given +
+      ": light of the surface that designs start from is totally reflected or misses the "
+      "screen; " +
+      (front ? "--front flat" : "--screen-tilt 0,0") + " works");
 }
 
 /// Returns what transport does to the mesh's x and y. Later rounds keep what optimisation has made

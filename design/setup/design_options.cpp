@@ -66,7 +66,7 @@ void require_wide_enough(const Eigen::Vector2i& pixels, const Image& picture, in
   }
   throw InputError("--pixels " + std::to_string(longer_side) + ": leaves the shorter side " +
                    std::to_string(pixels.minCoeff()) + " pixels, must be at least " + least +
-                   "; --pixels " + std::to_string(least_pixels(picture)) + " would do");
+                   "; --pixels " + std::to_string(least_pixels(picture)) + " works");
 }
 
 }  // namespace

@@ -100,17 +100,17 @@ void require_source_options(const LightOptions& light) {
   }
   if (light.source == SourceKind::kPoint && light.source_angle > 0.0) {
     refuse(angle_text(light.source_angle),
-           "is of parallel light; with --source point --source-size 3mm would do");
+           "is of parallel light; with --source point --source-size 3mm works");
   }
   if (light.source == SourceKind::kParallel && light.source_size > 0.0) {
     refuse(size_text(light.source_size),
-           "needs --source point; of parallel light --source-angle 9.3 would do");
+           "needs --source point; of parallel light --source-angle 9.3 works");
   }
   if (!light.source_shape.is_disc() && source_extent(light).none()) {
     refuse("--source-picture",
            "needs the width of what it shows; --source-" +
                std::string(light.source == SourceKind::kPoint ? "size 3mm" : "angle 9.3") +
-               " would do");
+               " works");
   }
 }
 
@@ -126,7 +126,7 @@ void require_source_extent(const DesignOptions& options, const OpticalSetup& set
   } while (share > kMinShare && !allows(narrower, options.thickness));
   refuse(width_text(options.light),
          "the light of each point of the lens must cover at most half of the picture; " +
-             narrower_text(options.light, share) + " would do");
+             narrower_text(options.light, share) + " works");
 }
 
 // The front, where light enters a lens.
@@ -188,14 +188,14 @@ void require_height_map(const OpticalSetup& setup, double thickness, const std::
   if (fault == FrontFault::kFolds) {
     refuse(given,
            "folds the light: neighbouring rays meet inside the lens; smoother heights or a smaller "
-           "--thickness would do");
+           "--thickness works");
   }
   const HeightGrid& grid = spline.grid();
   const int cells = std::clamp(std::max(grid.columns, grid.rows) - 1, kMinCells, kMaxCells);
   if (fault == FrontFault::kUnlit || !start_works(setup, thickness, depth, cells)) {
     refuse(given,
            "is too steep: light passes a part of it by, or is reflected totally behind it; "
-           "smaller slopes would do");
+           "smaller slopes work");
   }
 }
 
@@ -231,7 +231,7 @@ Eigen::Vector2d lens_size(const DesignOptions& o, const Eigen::Vector2i& pixels)
 }
 
 void require_point(const DesignOptions& o, const Eigen::Vector2d& size) {
-  const std::string usual = "--source-position " + usual_position(o, size) + " would do";
+  const std::string usual = "--source-position " + usual_position(o, size) + " works";
   if (!o.light.source_position) refuse("--source point", "needs a place; " + usual);
   const std::string given = "--source-position " + text_of(*o.light.source_position);
   if (!(o.light.source_position->cwiseAbs().maxCoeff() <= kMaxFocalLength)) {
@@ -271,7 +271,7 @@ void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
   }
   if (above && !(o.light.incidence > 0.0)) {
     refuse(mode, "needs light from the side, or the screen is in its way; --incidence " +
-                     number_text(kUsualIncidence) + " would do");
+                     number_text(kUsualIncidence) + " works");
   }
 }
 
@@ -296,9 +296,9 @@ std::string working_front(const DesignOptions& o, const Eigen::Vector2i& pixels,
   for (double r = std::max(std::abs(radius), least); r < kMaxFrontRadius; r *= kStep) {
     const double digit = std::pow(10.0, std::floor(std::log10(r)) - 1.0);
     const double rounded = std::copysign(std::ceil(r / digit) * digit, radius);
-    if (front_works(o, pixels, rounded)) return front_text(rounded) + " would do";
+    if (front_works(o, pixels, rounded)) return front_text(rounded) + " works";
   }
-  return "--front flat would do";
+  return "--front flat works";
 }
 
 /// @throw InputError if the source lies inside the part.
@@ -311,12 +311,12 @@ void require_source_outside(const DesignOptions& o, const OpticalSetup& setup) {
   refuse(
       "--source-position " + text_of(from),
       "lies inside the part, whose front is at z = " + number_text(front.height(from.head<2>())) +
-          " there; --source-position " + usual_position(o, setup.lens_size) + " would do");
+          " there; --source-position " + usual_position(o, setup.lens_size) + " works");
 }
 
 void require_sphere(const DesignOptions& o, const Eigen::Vector2i& pixels, double radius) {
   const std::string given = front_text(radius);
-  if (!(std::abs(radius) <= kMaxFrontRadius)) refuse(given, "is flat; --front flat would do");
+  if (!(std::abs(radius) <= kMaxFrontRadius)) refuse(given, "is flat; --front flat works");
   const Eigen::Vector2d size = lens_size(o, pixels);
   if (!(std::abs(radius) > 0.5 * size.norm())) {
     refuse(given, "the sphere is too small for the lens, whose half diagonal is " +
@@ -324,7 +324,7 @@ void require_sphere(const DesignOptions& o, const Eigen::Vector2i& pixels, doubl
   }
   require_source_outside(o, optical_setup(o, pixels));
   if (!front_works(o, pixels, radius)) {
-    refuse(given, "light passes a part of the front by, or is reflected totally behind it; " +
+    refuse(given, "part of the front is not lit, or its light is totally reflected; " +
                       working_front(o, pixels, radius));
   }
 }
@@ -335,7 +335,7 @@ void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
   const std::string given =
       map ? "--front " + o.light.front_file : front_text(*o.light.front_radius);
   if (!traits(o.light.body).transmits) {
-    refuse(given, std::string("is of a lens; --front flat would do with --mode ") +
+    refuse(given, std::string("is of a lens; --front flat works with --mode ") +
                       traits(o.light.body).mode);
   }
   if (!map) return require_sphere(o, pixels, *o.light.front_radius);
@@ -364,22 +364,20 @@ double tilt_of(const Eigen::Vector2d& degrees) {
 void require_tilt(const Eigen::Vector2d& tilt) {
   const double limit = kMaxTilt + 1e-9;
   if (tilt.allFinite() && tilt.cwiseAbs().maxCoeff() <= limit && tilt_of(tilt) <= limit) return;
-  refuse(
-      "--screen-tilt " + text_of(tilt),
-      "must turn the screen by at most " + number_text(kMaxTilt) + " degrees in all; 0,0 would do");
+  refuse("--screen-tilt " + text_of(tilt),
+         "must turn the screen by at most " + number_text(kMaxTilt) + " degrees in all; 0,0 works");
 }
 
 void require_picture(const DesignOptions& o) {
   const Eigen::Vector2d& offset = o.light.image_offset;
   if (!(offset.cwiseAbs().maxCoeff() <= kMaxImageWidth)) {
     refuse("--image-offset " + text_of(offset),
-           "must be at most " + number_text(kMaxImageWidth) + " mm; 0,0 would do");
+           "must be at most " + number_text(kMaxImageWidth) + " mm; 0,0 works");
   }
   const double least = kMinMagnification * o.width;
   if (o.light.image_width > 0.0 && o.light.image_width < least) {
-    refuse(
-        "--image-width " + number_text(o.light.image_width),
-        "must be at least a hundredth of the lens's width; " + number_text(least) + "mm would do");
+    refuse("--image-width " + number_text(o.light.image_width),
+           "must be at least a hundredth of the lens's width; " + number_text(least) + "mm works");
   }
 }
 
@@ -388,7 +386,7 @@ void require_spectrum(const DesignOptions& o) {
   const Spectrum& spectrum = o.light.spectrum;
   if (spectrum.none() && spectrum.abbe != Spectrum{}.abbe) {
     refuse("--abbe " + number_text(spectrum.abbe),
-           "needs --wavelengths; --wavelengths 450,550,650 would do");
+           "needs --wavelengths; --wavelengths 450,550,650 works");
   }
   if (!spectrum.none() && !traits(o.light.body).transmits) {
     refuse("--wavelengths " + spectrum_text(spectrum),
@@ -414,10 +412,10 @@ void require_reach(const DesignOptions& o, const OpticalSetup& setup) {
     if (!reaches_centre(at_focal_length(setup, focal, o.thickness), o.thickness)) continue;
     refuse("--focal " + number_text(o.focal_length),
            "no surface bends the light so far as to the picture's centre; --focal " +
-               number_text(focal) + "mm would do");
+               number_text(focal) + "mm works");
   }
   refuse("--image-offset " + text_of(o.light.image_offset),
-         "no surface bends the light so far; 0,0 would do");
+         "no surface bends the light so far; 0,0 works");
 }
 
 /// Place of a lamp on the screen's side of the part; none if there is none.
@@ -454,7 +452,7 @@ void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
     const double gain = farther[k] - here[k];
     if (here[k] <= 0.0 && !(gain > 0.0)) {
       refuse("--screen-tilt " + text_of(o.light.screen_tilt),
-             "turns the screen away from the light; --screen-tilt 0,0 would do");
+             "turns the screen away from the light; --screen-tilt 0,0 works");
     }
     if (here[k] <= 0.0) needed = std::max(needed, setup.focal_length - here[k] / gain);
   }
@@ -463,7 +461,7 @@ void require_screen_beyond(const DesignOptions& o, const OpticalSetup& setup) {
                                   : "--focal " + number_text(o.focal_length);
   refuse(what, std::string("the screen must stand wholly beyond the surface") +
                    (lamp_above(setup) ? " and the source" : "") + "; --focal " +
-                   number_text(std::ceil(1.1 * needed)) + "mm would do");
+                   number_text(std::ceil(1.1 * needed)) + "mm works");
 }
 
 /// True if the picture on the screen blocks the light to a point of a mirror.
@@ -524,7 +522,7 @@ void require_unshaded(const DesignOptions& o, const Eigen::Vector2i& pixels,
                                 : "--incidence " + number_text(o.light.incidence);
   const std::string free = free_light(o, pixels);
   refuse(given, "the screen is in the way of the light that comes to the mirror; " +
-                    (free.empty() ? "a smaller --image-width" : free) + " would do");
+                    (free.empty() ? "a smaller --image-width" : free) + " works");
 }
 
 }  // namespace
@@ -551,7 +549,7 @@ std::shared_ptr<const HeightSpline> front_from(const std::string& file, const Ru
     refuse(
         "--front '" + file + "'",
         "is no file here; must be flat, sphere:R with R a radius in mm, or a picture of heights; "
-        "flat would do");
+        "flat works");
   }
   return std::make_shared<HeightSpline>(read_heights(file, control));
 }

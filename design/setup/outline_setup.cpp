@@ -138,7 +138,7 @@ std::vector<Eigen::Vector2d> contour_of(const Image& picture, const std::string&
 namespace {
 
 const std::string kRounded = "rounded:";
-constexpr const char* kCircleWouldDo = "; circle would do";
+constexpr const char* kCircleWorks = "; circle works";
 
 bool is_svg_file(const std::string& path) {
   std::ifstream file = open_input(path);
@@ -160,7 +160,7 @@ OutlineChoice outline_from(const std::string& text, const Background& background
   std::error_code none;
   if (!std::filesystem::exists(text, none)) {
     refuse("'" + text + "': must be rectangle, circle, rounded:R with R in mm, or a picture" +
-           kCircleWouldDo);
+           kCircleWorks);
   }
   LoadedImage loaded = read_image(text, control, kOutlineDrawing, background);
   Image& picture = loaded.image;
@@ -197,16 +197,16 @@ void require_outline(const std::optional<Outline>& outline, const Eigen::Vector2
     }
   }
   if (outline->kind == OutlineKind::kPolygon) {
-    if (const auto fault = polygon_fault(outline->points)) refuse(*fault + kCircleWouldDo);
+    if (const auto fault = polygon_fault(outline->points)) refuse(*fault + kCircleWorks);
   }
   const Outline inside = fitted(*outline, lens_size);
-  if (const auto fault = polygon_fault(inside.points)) refuse(*fault + kCircleWouldDo);
+  if (const auto fault = polygon_fault(inside.points)) refuse(*fault + kCircleWorks);
   const double share = polygon_area(inside.points) / lens_size.prod();
   if (!(share >= kMinOutlineShare)) {
     refuse("leaves " + number_text(100.0 * share, 2) + " % of the lens's rectangle of " +
            number_text(lens_size.x()) + " x " + number_text(lens_size.y()) +
            " mm to the light: must be at least " + number_text(100.0 * kMinOutlineShare) + " %" +
-           kCircleWouldDo);
+           kCircleWorks);
   }
 }
 

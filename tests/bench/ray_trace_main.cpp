@@ -67,8 +67,8 @@ void require_usual_light(const Lens& lens) {
     return;
   }
   throw InputError(
-      "DIR: its light or screen is not known here; a lens of design without --source, --mode, "
-      "--source-angle and --screen-tilt would do");
+      "DIR: its light or screen is not known here; design it without --source, --mode, "
+      "--source-angle and --screen-tilt");
 }
 
 void run(Arguments& arguments) {

@@ -63,12 +63,12 @@ TEST(NestLayout, RefusesWithASizeThatWouldDo) {
   EXPECT_THAT(message_of<InputError>([&] {
                 place_in_rows(items, {{100.0, 90.0}, 5.0, 4.0});
               }),
-              AllOf(HasSubstr("--blank 100 x 90 mm"), HasSubstr("100 x 108 mm would do")));
+              AllOf(HasSubstr("--blank 100 x 90 mm"), HasSubstr("100 x 108 mm works")));
   EXPECT_EQ(place_in_rows(items, {{100.0, 108.0}, 5.0, 4.0}).size(), 5U);
   EXPECT_THAT(message_of<InputError>([&] {
                 place_in_rows(items, {{45.0, 300.0}, 5.0, 4.0});
               }),
-              HasSubstr("48 x 300 mm would do"));
+              HasSubstr("48 x 300 mm works"));
   EXPECT_EQ(place_in_rows(items, {{48.0, 300.0}, 5.0, 4.0}).size(), 5U);
 }
 
@@ -247,7 +247,7 @@ TEST_F(NestJob, RectanglesThatStayJoinedAreNamed) {
 
 TEST_F(NestJob, WhatDoesNotFitOneBlankIsRefusedInOneLine) {
   options_.blank = {20.0, 10.0};
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("--blank 20 x 10 mm"), HasSubstr("would do")));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--blank 20 x 10 mm"), HasSubstr("works")));
   options_.blank = {60.0, -1.0};
   EXPECT_THAT(refusal(), HasSubstr("both sides must be above 0"));
   options_.blank = {60.0, 30.0};
@@ -297,14 +297,13 @@ TEST_F(NestJob, AnOutlineToolThatIsTooShortIsNamedWithOneThatWouldDo) {
   EXPECT_EQ(advice(), "");
   add_mill(7, 4.0);
   EXPECT_EQ(advice(), "--outline-tool 7: goes 4 mm deep at most, too short for a blank of " +
-                          trimmed_decimal(needed_thickness(), 3) +
-                          " mm; --outline-tool 3 would do");
+                          trimmed_decimal(needed_thickness(), 3) + " mm; --outline-tool 3 works");
   shop.tools.front().flute_length = 3.0;
   EXPECT_THAT(advice(), HasSubstr("a flat end mill with flutes of"));
   options_.thickness = 14.0;
   add_mill(8, 8.5);
   EXPECT_THAT(advice(), AllOf(HasSubstr("too short for a blank of 14 mm; --blank 60,30,"),
-                              HasSubstr(" would do")));
+                              HasSubstr(" works")));
   options_.thickness.reset();
   EXPECT_EQ(advice(), "");
 }

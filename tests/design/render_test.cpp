@@ -227,7 +227,7 @@ TEST(Fringe, WavelengthsAreReadOrRefusedInOneLine) {
   for (const char* text : {"", "550", "650,550", "550,550", "300,550", "550,800", "1,2,3,4,5,6",
                            "450:1,550", "450:1,550:0", "450:1,550:-1", "450:1:550"}) {
     EXPECT_THAT(message_of<InputError>([&] { (void)parse_spectrum(text, "--wavelengths"); }),
-                EndsWith("450,550,650 would do"));
+                EndsWith("450,550,650 works"));
   }
 }
 

@@ -94,16 +94,16 @@ TEST_F(BadPicture, BlackOnNothingNamesTheBackgroundThatShowsIt) {
   const Outcome info = run({"info", path("logo.png"), "--background", "white", "--json"});
   ASSERT_EQ(info.exit_code, 0) << info.err;
   EXPECT_DOUBLE_EQ(info.json()["mean"].get<double>(), 0.5);
-  expect_refusal(run({"info", path("logo.png"), "--background", "grey"}), 2, {"#ffffff would do"});
+  expect_refusal(run({"info", path("logo.png"), "--background", "grey"}), 2, {"#ffffff works"});
 }
 
 TEST_F(BadPicture, AThinOneNamesThePixelsThatWouldDo) {
   write_image(Image(1000, 8, 0.5F), at("thin.png"));
-  expect_refused("thin.png", {"--pixels 256", "2 pixels", "--pixels 438 would do"});
+  expect_refused("thin.png", {"--pixels 256", "2 pixels", "--pixels 438 works"});
   write(at("thin.svg"),
         "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 100 1'>"
         "<rect width='60' height='1' fill='white'/></svg>");
-  expect_refused("thin.svg", {"thin.svg", "256 x 3", "--pixels 359 would do"});
+  expect_refused("thin.svg", {"thin.svg", "256 x 3", "--pixels 359 works"});
 }
 
 TEST_F(BadPicture, OnePixel) {

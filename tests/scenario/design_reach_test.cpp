@@ -17,13 +17,13 @@ class DesignReach : public Scenario {
     return run(arguments);
   }
 
-  /// Refused with a focal length that would do, and that one does.
+  /// Refused with a focal length that works, and that one does.
   void expect_advice_works(Arguments options) const {
     const Outcome refused = design(options);
-    expect_refusal(refused, 2, {"--focal", "would do"});
+    expect_refusal(refused, 2, {"--focal", "works"});
     EXPECT_FALSE(fs::exists(at("lens"))) << "a checkpoint would refuse the corrected command";
     std::smatch advice;
-    const std::regex form("--focal ([0-9.e+]+mm) would do");
+    const std::regex form("--focal ([0-9.e+]+mm) works");
     ASSERT_TRUE(std::regex_search(refused.err, advice, form)) << refused.err;
     options.insert(options.end(), {"--focal", advice[1].str()});
     if (options.front() == "--focal") options.erase(options.begin(), options.begin() + 2);
@@ -40,7 +40,7 @@ TEST_F(DesignReach, NothingIsSaidOfADesignThatIsRefused) {
   Arguments arguments = small_design(picture("portrait.png"), path("lens"));
   arguments.insert(arguments.end(), {"--resume", "--focal", "7"});
   const Outcome refused = run(arguments);
-  expect_refusal(refused, 2, {"--focal", "would do"});
+  expect_refusal(refused, 2, {"--focal", "works"});
   EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
 }
 
@@ -63,7 +63,7 @@ TEST_F(DesignReach, AFirstSurfaceThatSendsLightPastTheScreenIsRefused) {
     return design({"--width", "12mm", "--source", "point", "--source-position", "21,19,-8",
                    "--transport-rounds", "0", "--screen-tilt", tilt});
   };
-  expect_refusal(tilted("34,-13"), 2, {"--screen-tilt 34,-13: ", "--screen-tilt 0,0 would do"});
+  expect_refusal(tilted("34,-13"), 2, {"--screen-tilt 34,-13: ", "--screen-tilt 0,0 works"});
   EXPECT_FALSE(fs::exists(at("lens"))) << "a checkpoint would refuse the corrected command";
   EXPECT_EQ(tilted("0,0").exit_code, 0);
 }

@@ -44,7 +44,7 @@ TEST_F(Nest, WhatIsMissingOrDoesNotFitIsRefusedInOneLine) {
   expect_refusal(run({"nest", path("bee"), "--out", path("sheet")}), 2, {"--blank: is required"});
   expect_refusal(run({"nest", "--out", path("sheet"), "--blank", "9,9"}), 2, {"DIR: is required"});
   expect_refusal(nest({"--blank", "9"}), 2, {"--blank"});
-  expect_refusal(nest({"--blank", "20,20"}), 2, {"--blank 20 x 20 mm", "would do"});
+  expect_refusal(nest({"--blank", "20,20"}), 2, {"--blank 20 x 20 mm", "works"});
   expect_refusal(nest({"--blank", "400,200", "--gap", "0.5"}), 2, {"--gap 0.5", "at least"});
   expect_refusal(run({"nest", path("none"), "--out", path("sheet"), "--blank", "99,99"}), 2,
                  {path("none")});

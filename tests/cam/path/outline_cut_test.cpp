@@ -225,7 +225,7 @@ TEST(OutlineOperation, RefusesWhatCannotHold) {
   const Points rectangle{{0, 0}, {60, 0}, kSize, {0, 50}};
   EXPECT_THAT(
       message_of<InputError>([&] { require_outline_cut(rectangle, usual_cut(), blank_with(3.0)); }),
-      HasSubstr("--margin 6mm would do"));
+      HasSubstr("--margin 6mm works"));
   EXPECT_NO_THROW(require_outline_cut(rectangle, usual_cut(), blank_with(6.0)));
 }
 

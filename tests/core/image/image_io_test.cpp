@@ -342,7 +342,7 @@ TEST(Background, IsReadAndWrittenInWords) {
   for (const std::string text :
        {"", "grey", "#12345", "#1234567", "#12345g", "123456", "#+12345"}) {
     EXPECT_EQ(message_of<InputError>([&] { Background::parse(text); }),
-              "--background '" + text + "': must be black, white or #RRGGBB; #ffffff would do");
+              "--background '" + text + "': must be black, white or #RRGGBB; #ffffff works");
   }
 }
 

@@ -74,7 +74,7 @@ TEST_F(PictureChild, ADecoderThatCrashesIsOneLineAboutTheFile) {
   };
   EXPECT_EQ(refusal(crash), path_.string() +
                                 ": is no picture that can be read: its decoder crashed; saved anew "
-                                "as PNG it would do");
+                                "save it as PNG");
 }
 
 TEST_F(PictureChild, ADecoderThatComesToNoEndIsEnded) {
