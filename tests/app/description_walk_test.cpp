@@ -124,7 +124,7 @@ void expect_options_found() {
   append_fingerprint(fields, fingerprint);
   std::size_t stored = 0;
   for (const Field& field : fields) {
-    EXPECT_THAT(help, HasSubstr("\n  " + field.name));
+    EXPECT_THAT(help, HasSubstr(field.name == "--out" ? "\n  -o,--out" : "\n  " + field.name));
     EXPECT_THAT(help, HasSubstr(help_text(field)));
     if (field.name.starts_with('-')) {
       EXPECT_THAT(manual, HasSubstr(manual_item(field)));

@@ -73,8 +73,8 @@ TEST_F(PictureChild, ADecoderThatCrashesIsOneLineAboutTheFile) {
     return {};
   };
   EXPECT_EQ(refusal(crash), path_.string() +
-                                ": is no picture that can be read: its decoder crashed; saved anew "
-                                "save it as PNG");
+                                ": is no picture that can be read: its decoder crashed; save it "
+                                "as PNG");
 }
 
 TEST_F(PictureChild, ADecoderThatComesToNoEndIsEnded) {
