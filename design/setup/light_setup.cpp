@@ -194,7 +194,7 @@ void require_height_map(const OpticalSetup& setup, double thickness, const std::
   const int cells = std::clamp(std::max(grid.columns, grid.rows) - 1, kMinCells, kMaxCells);
   if (fault == FrontFault::kUnlit || !start_works(setup, thickness, depth, cells)) {
     refuse(given,
-           "is too steep: light passes a part of it by, or is reflected totally behind it; "
+           "is too steep: part of it is not lit, or its light is totally reflected; "
            "smaller slopes work");
   }
 }

@@ -41,6 +41,7 @@ class Interrupt : public Scenario {
   void expect_ends_as_it_should(const Arguments& arguments, int signal, milliseconds wait) const {
     SCOPED_TRACE(arguments.front() + ", signal " + std::to_string(signal) + " after " +
                  std::to_string(wait.count()) + " ms");
+    for (const char* out : {"new", "sheet", "coupon", "shape", "jobs"}) fs::remove_all(at(out));
     Process process(arguments);
     const bool runs = process.runs_for(wait);
     const bool caught = process.catches(signal);
@@ -52,7 +53,7 @@ class Interrupt : public Scenario {
     // Only while its libraries are loaded the system ends it.
     EXPECT_FALSE(runs && caught && died);
     if (outcome.exit_code != 130) return;
-    EXPECT_THAT(outcome.err, ::testing::HasSubstr("interrupted"));
+    EXPECT_THAT(outcome.out + outcome.err, ::testing::HasSubstr("interrupted"));
   }
 };
 
