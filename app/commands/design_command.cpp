@@ -90,7 +90,9 @@ void refuse_part_options(const OptionSet& options, CamOptions& cut) {
 
 void note_changes(DesignSettings& settings, const std::string& picture,
                   const std::vector<std::string>& changes) {
-  for (const std::string& change : changes) settings.changes.push_back(picture + ": " + change);
+  for (const std::string& change : changes) {
+    settings.changes.push_back(joined({picture, ": ", change}));
+  }
 }
 
 /// Checks that a drawing has the requested number of pixels. @throw InputError naming a --pixels

@@ -107,6 +107,7 @@ inline std::string model_name(SurfaceModel model) {
 template <class Models>
 std::vector<std::pair<std::string, SurfaceModel>> named(const Models& some) {
   std::vector<std::pair<std::string, SurfaceModel>> models;
+  models.reserve(some.size());
   for (const SurfaceModel model : some) models.emplace_back(model_name(model), model);
   return models;
 }

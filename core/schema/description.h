@@ -108,8 +108,8 @@ class Place {
  public:
   Place(Value& value) : at_([&value]() -> Value& { return value; }) {}  // NOLINT: as a reference
   template <class Function>
-  requires std::is_invocable_r_v<Value&, Function> Place(Function at)
-      : at_(std::move(at)) {}  // NOLINT: as a reference
+  // NOLINTNEXTLINE: as a reference
+  requires std::is_invocable_r_v<Value&, Function> Place(Function at) : at_(std::move(at)) {}
   [[nodiscard]] Value& operator()() const { return at_(); }
 
  private:
