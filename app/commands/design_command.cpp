@@ -46,6 +46,7 @@
 #include "core/spline/control_net.h"
 #include "core/text/printable.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/design.h"
 #include "design/mpi/session.h"
 #include "design/schedule/levels.h"
