@@ -113,6 +113,7 @@ std::string quoted(const std::string& text, std::string_view escaped = {}) {
 
 std::string command_names(const std::vector<CompletedCommand>& commands) {
   std::vector<std::string> names;
+  names.reserve(commands.size());
   for (const CompletedCommand& command : commands) names.push_back(command.name);
   return joined(names, " ");
 }
@@ -121,7 +122,7 @@ std::string command_names(const std::vector<CompletedCommand>& commands) {
 
 /// The text after "COMMAND --option) " in the script.
 std::string bash_value(const Value& value) {
-  const std::string words = "_lensforge_words " + quoted(joined(value.words, " "));
+  std::string words = "_lensforge_words " + quoted(joined(value.words, " "));
   switch (value.kind) {
     case Value::Kind::kWords:
       return words;
@@ -191,7 +192,7 @@ std::string zsh_value(const Value& value) {
     case Value::Kind::kWords:
       return std::string("(").append(words).append(")");
     case Value::Kind::kFile: {
-      const std::string files =
+      std::string files =
           value.extension.empty() ? "_files" : "_files -g \"*." + value.extension + "\"";
       if (value.words.empty()) return files;
       return "{compadd " + words + "; " + files + "}";

@@ -36,7 +36,7 @@ std::string metrics_text(const ModelMetrics& metrics) {
 std::string metrics_text(const Lens& lens) {
   ModelMetrics shown = lens.metrics;
   if (lens.model != SurfaceModel::kFacet && shown.size() > 1) shown.erase(SurfaceModel::kFacet);
-  const std::string models = metrics_text(shown);
+  std::string models = metrics_text(shown);
   if (!lens.source_limit) return models;
   return models + "  limit   " + metrics_text(*lens.source_limit) +
          "  of any surface, this source\n";
