@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # debian.sh RELEASE COMPILER [FOLDER]: builds the committed sources in a bare root of a Debian release (bookworm,
-# trixie) with gcc or with the newest clang of that release, runs the fast tests there, and prints the versions of
-# the compiler and the libraries used. The root is kept in FOLDER (build/portability) for the next run.
+# trixie) with gcc or with the newest clang of that release, runs the fast tests there, makes a wheel, and prints the
+# versions of the compiler and the libraries used. The root is kept in FOLDER (build/portability) for the next run.
 set -euo pipefail
 [[ $# -ge 2 && $# -le 3 && $1 =~ ^(bookworm|trixie)$ && $2 =~ ^(gcc|clang)$ ]] ||
   { sed -n '3,6s/^# //p' "$0" >&2; exit 2; }
@@ -31,7 +31,7 @@ compiler() {
 
 outcome=0
 in_root "$ROOT" "$(compiler)
-  cd $SOURCES && ./bootstrap test" || outcome=$?
+  cd $SOURCES && ./bootstrap test && ./bootstrap wheel" || outcome=$?
 # shellcheck disable=SC2016
 in_root "$ROOT" "$(compiler) >/dev/null"'
   echo "release: $(cat /etc/debian_version); compiler: $($CXX --version | head -1)"
