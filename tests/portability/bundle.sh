@@ -24,7 +24,7 @@ in_root "$ROOT" '
   lensforge() { echo "lensforge $*"; /opt/lensforge/bin/lensforge "$@" --quiet; }
   /opt/lensforge/bin/lensforge --version
   lensforge design portrait.png --pixels 64 --width 25 --focal 75 --quality draft --out lens
-  lensforge cam lens --pitch 0.1 --slope-tolerance 2e-4 --no-remedies || [[ $? -eq 3 ]]
+  lensforge cam lens --post grbl --pitch 0.1 --slope-tolerance 2e-4 --no-remedies || [[ $? -eq 3 ]]
   lensforge export lens --out lens.step
   lensforge render lens.step --focal 75 --pixels 64 --out again.png
   lensforge view lens --out lens.html
