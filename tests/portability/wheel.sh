@@ -24,4 +24,4 @@ in_root "$ROOT" '
   python3 -m venv --system-site-packages environment
   environment/bin/pip -q install --no-index ./*.whl
   environment/bin/python readme.py
-  environment/bin/pip show -f lensforge | head -3'
+  environment/bin/pip show lensforge'
