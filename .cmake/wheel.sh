@@ -12,7 +12,7 @@ version=$(sed -n 's/^CMAKE_PROJECT_VERSION:STATIC=//p' "$BUILD/CMakeCache.txt")
 python=$(PATH=/usr/bin:$PATH command -v python3)
 folder=$OUT/wheel
 rm -rf "$folder" && mkdir -p "$folder/lensforge/lib"
-cp "$BUILD"/python/lensforge/{__init__.py,__init__.pyi,py.typed,_lensforge*.so} "$folder/lensforge"
+cp "$BUILD"/python/lensforge/{*.py,__init__.pyi,py.typed,_lensforge*.so} "$folder/lensforge"
 cp "$BUILD"/lensforge-*.so "$folder/lensforge/lib"
 
 modules=("$folder"/lensforge/lib/lensforge-*.so)

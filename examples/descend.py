@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moves a lens's heights down the gradient of its picture's error: a loop to which you can add terms."""
+"""Moves a lens's heights down the gradient of its picture's error: a loop to which you can add terms.
+
+descend.py [DIR]: the lens in a folder; without one, a lens for a small picture that is drawn here.
+"""
 
 import sys
 
@@ -7,9 +10,12 @@ import numpy as np
 
 import lensforge
 
-lens = lensforge.Lens(sys.argv[1])
-wanted = lens.target / lens.target.sum()
-vertices = lens.vertices.copy()
+
+def drawn_lens():
+    """A ring on grey, quickly designed."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 32), np.linspace(-1, 1, 32))
+    picture = 0.3 + 0.7 * (abs(np.hypot(x, y) - 0.6) < 0.2)
+    return lensforge.design(picture, width=12, focal=60, rounds=1, quality="draft")
 
 
 def error_and_slope():
@@ -20,6 +26,9 @@ def error_and_slope():
     return (miss**2).mean(), bar[:, 2]
 
 
+lens = lensforge.Lens(sys.argv[1]) if len(sys.argv) > 1 else drawn_lens()
+wanted = lens.target / lens.target.sum()
+vertices = lens.vertices.copy()
 step = 1e-6  # mm
 error, slope = error_and_slope()
 for _ in range(30):

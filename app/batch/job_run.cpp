@@ -97,16 +97,20 @@ int wait_for(pid_t child, const std::stop_token& stop) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : kSignalBase + WTERMSIG(status);
 }
 
-/// Runs this very program with `words`, its output going to two files: `out` is replaced, `log` is
-/// added to. When `stop` is requested, or the calling thread ends, it is interrupted as by Ctrl-C.
+/// The words that start a command, the first a program's path.
+Arguments program_of(const BatchPlace& place) {
+  if (!place.program.empty()) return place.program;
+  return {fs::read_symlink("/proc/self/exe").string()};
+}
+
+/// Runs the program with `words`, its output going to two files: `out` is replaced, `log` is added
+/// to. When `stop` is requested, or the calling thread ends, it is interrupted as by Ctrl-C.
 /// @throw RunError with the system's reason if no process can be made or a file not be written.
-StepEnd run_step(const Arguments& words, const fs::path& out, const fs::path& log,
-                 const std::stop_token& stop) {
+StepEnd run_step(Arguments program, const Arguments& words, const fs::path& out,
+                 const fs::path& log, const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
-  const std::string program = fs::read_symlink("/proc/self/exe").string();
-  Arguments all{program};
-  all.insert(all.end(), words.begin(), words.end());
-  const CommandLine command(all);
+  program.insert(program.end(), words.begin(), words.end());
+  const CommandLine command(program);
   const Descriptor result = open_output(out, O_TRUNC);
   const Descriptor messages = open_output(log, O_APPEND);
   const Descriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
@@ -114,7 +118,8 @@ StepEnd run_step(const Arguments& words, const fs::path& out, const fs::path& lo
   const pid_t child = ::fork();
   if (child < 0) fail("fork");
   if (child == 0) {
-    become(program.c_str(), command, nothing.number(), result.number(), messages.number(), parent);
+    become(program.front().c_str(), command, nothing.number(), result.number(), messages.number(),
+           parent);
   }
   const int code = wait_for(child, stop);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
@@ -261,7 +266,8 @@ class JobWork {
     const fs::path log = folder_ / kJobLog;
     std::error_code ignored;
     const std::uintmax_t before = fs::exists(log, ignored) ? fs::file_size(log, ignored) : 0;
-    const StepEnd end = run_step(words_of(step), folder_ / kStepOutput, log, stop_);
+    const StepEnd end =
+        run_step(program_of(place_), words_of(step), folder_ / kStepOutput, log, stop_);
     if (stop_.stop_requested() && end.exit_code == kInterrupted) {
       return JobOutcome{Status::kInterrupted, "", false, end.seconds};
     }

@@ -44,6 +44,7 @@ struct BatchPlace {
   std::string jobs_file;      ///< For messages.
   int threads = 0;            ///< For commands that do not set it; 0: the command's default.
   bool force = false;         ///< Repeat jobs that were done with other options.
+  Arguments program = {};     ///< Words that start a command; none: this very program.
 };
 
 /// Returns this job's job.json, finished or not: "status", "message", "seconds" of the finished

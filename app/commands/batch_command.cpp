@@ -13,7 +13,6 @@
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
-#include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "core/error.h"
 #include "core/io/files.h"
@@ -32,6 +31,7 @@ struct BatchSettings {
   std::vector<std::string> grid;
   int parallel = 1;
   bool force = false;
+  Arguments program;  ///< BatchPlace's.
 };
 
 constexpr int kMaxParallel = 1024;
@@ -81,8 +81,8 @@ Shard read_shard(const std::string& text) {
 class BatchRun {
  public:
   BatchRun(const std::vector<BatchJob>& jobs, const Shard& shard, const BatchPlace& place,
-           const Console& console)
-      : jobs_(jobs), place_(place), console_(console), outcomes_(jobs.size()) {
+           const CommandFrame& frame)
+      : jobs_(jobs), place_(place), frame_(frame), outcomes_(jobs.size()) {
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       if (shard.has(i)) mine_.push_back(i);
     }
@@ -115,15 +115,18 @@ class BatchRun {
   void tell(const BatchJob& job, const JobOutcome& outcome) {
     const std::scoped_lock lock(telling_);
     ++told_;
-    console_.note(std::to_string(told_) + "/" + std::to_string(mine_.size()) + " " + job.name +
-                  ": " + (outcome.earlier ? "was done before" : status_word(outcome.status)) +
-                  (outcome.message.empty() ? "" : ", " + outcome.message) +
-                  (outcome.earlier ? "" : ", " + fixed(outcome.seconds, 1) + " s"));
+    frame_.console().note(std::to_string(told_) + "/" + std::to_string(mine_.size()) + " " +
+                          job.name + ": " +
+                          (outcome.earlier ? "was done before" : status_word(outcome.status)) +
+                          (outcome.message.empty() ? "" : ", " + outcome.message) +
+                          (outcome.earlier ? "" : ", " + fixed(outcome.seconds, 1) + " s"));
+    frame_.report_to_host(
+        {"batch", static_cast<double>(told_), static_cast<double>(mine_.size()), job.name});
   }
 
   const std::vector<BatchJob>& jobs_;
   const BatchPlace& place_;
-  const Console& console_;
+  const CommandFrame& frame_;
   std::vector<std::size_t> mine_;
   std::vector<JobOutcome> outcomes_;
   std::atomic<std::size_t> next_ = 0;
@@ -190,26 +193,34 @@ CommandResult run(CommandFrame& frame, BatchSettings& settings) {
   std::vector<BatchJob> jobs = expanded(read_jobs(settings.jobs_file), read_grid(settings.grid));
   fingerprint_targets(jobs);
   const int threads = std::max(1, frame.options().executor().concurrency() / settings.parallel);
-  const BatchPlace place{settings.out, settings.jobs_file, threads, settings.force};
+  const BatchPlace place{settings.out, settings.jobs_file, threads, settings.force,
+                         settings.program};
   for (const BatchJob& job : jobs) require_room_for(job, place);
   if (!settings.table.empty()) {
     require_replaceable("--table", settings.table, settings.force || is_job_table(settings.table));
   }
   require_writable_folder(settings.out);
-  const InterruptWatch interrupt;
+  frame.begin();
   frame.console().begin();
-  BatchRun batch(jobs, shard, place, frame.console());
-  batch.run(settings.parallel, interrupt.token());
+  BatchRun batch(jobs, shard, place, frame);
+  batch.run(settings.parallel, frame.stop_token());
   if (!settings.table.empty()) write_whole_file(settings.table, table_of(jobs, batch, place));
   return {result_json(settings, jobs, batch), result_text(settings, jobs, batch),
-          exit_code(batch, interrupt.token())};
+          exit_code(batch, frame.stop_token())};
+}
+
+Command<BatchSettings> command() {
+  return {"batch", "Does the jobs of a file, each in a folder of its own.", run};
 }
 
 }  // namespace
 
-int batch_command(const Arguments& arguments) {
-  return run_command<BatchSettings>(
-      {"batch", "Does the jobs of a file, each in a folder of its own.", run}, arguments);
+int batch_command(const Arguments& arguments) { return run_command(command(), arguments); }
+
+CommandCall batch_call(const Arguments& program) {
+  BatchSettings settings;
+  settings.program = program;
+  return call_of(command(), settings);
 }
 
 }  // namespace lensforge::app

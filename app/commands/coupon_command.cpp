@@ -139,12 +139,15 @@ CommandResult run(CommandFrame& frame, CouponSettings& settings) {
   return settings.fit.empty() ? make(frame, settings) : fit(frame, settings);
 }
 
+Command<CouponSettings> command() {
+  return {"coupon", "Makes a test piece that calibrates a workshop, or fits the workshop to it.",
+          run};
+}
+
 }  // namespace
 
-int coupon_command(const Arguments& arguments) {
-  return run_command<CouponSettings>(
-      {"coupon", "Makes a test piece that calibrates a workshop, or fits the workshop to it.", run},
-      arguments);
-}
+int coupon_command(const Arguments& arguments) { return run_command(command(), arguments); }
+
+CommandCall coupon_call() { return call_of(command(), CouponSettings()); }
 
 }  // namespace lensforge::app

@@ -405,12 +405,14 @@ CommandResult run(CommandFrame& frame, InfoSettings& settings) {
   return *described;
 }
 
+Command<InfoSettings> command() {
+  return {"info", "Says what a lens folder, solid, mesh, picture or G-code program is.", run};
+}
+
 }  // namespace
 
-int info_command(const Arguments& arguments) {
-  return run_command<InfoSettings>(
-      {"info", "Says what a lens folder, solid, mesh, picture or G-code program is.", run},
-      arguments);
-}
+int info_command(const Arguments& arguments) { return run_command(command(), arguments); }
+
+CommandCall info_call() { return call_of(command(), InfoSettings()); }
 
 }  // namespace lensforge::app

@@ -207,15 +207,18 @@ CommandResult run(CommandFrame& frame, NestSettings& settings) {
           exit_code(result.done(), result.missed() == 0), warnings_of(result)};
 }
 
+Command<NestSettings> command() {
+  return {
+      "nest",
+      "Makes programs that mill several lenses of one blank with one zero, and predicts what each "
+      "will project.",
+      run};
+}
+
 }  // namespace
 
-int nest_command(const Arguments& arguments) {
-  return run_command<NestSettings>(
-      {"nest",
-       "Makes programs that mill several lenses of one blank with one zero, and predicts what each "
-       "will project.",
-       run},
-      arguments);
-}
+int nest_command(const Arguments& arguments) { return run_command(command(), arguments); }
+
+CommandCall nest_call() { return call_of(command(), NestSettings()); }
 
 }  // namespace lensforge::app

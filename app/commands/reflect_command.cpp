@@ -187,11 +187,14 @@ CommandResult run(CommandFrame& frame, ReflectSettings& settings) {
   return settings.evaluate ? evaluate(frame, settings) : shape(frame, settings);
 }
 
+Command<ReflectSettings> command() {
+  return {"reflect", "Deforms a mesh so that it reflects light as wanted.", run};
+}
+
 }  // namespace
 
-int reflect_command(const Arguments& arguments) {
-  return run_command<ReflectSettings>(
-      {"reflect", "Deforms a mesh so that it reflects light as wanted.", run}, arguments);
-}
+int reflect_command(const Arguments& arguments) { return run_command(command(), arguments); }
+
+CommandCall reflect_call() { return call_of(command(), ReflectSettings()); }
 
 }  // namespace lensforge::app

@@ -74,11 +74,14 @@ CommandResult run(CommandFrame& frame, ViewSettings& settings) {
           summary_text(view, settings.out, page.size())};
 }
 
+Command<ViewSettings> command() {
+  return {"view", "Writes a page that draws a lens's light and lets one change it.", run};
+}
+
 }  // namespace
 
-int view_command(const Arguments& arguments) {
-  return run_command<ViewSettings>(
-      {"view", "Writes a page that draws a lens's light and lets one change it.", run}, arguments);
-}
+int view_command(const Arguments& arguments) { return run_command(command(), arguments); }
+
+CommandCall view_call() { return call_of(command(), ViewSettings()); }
 
 }  // namespace lensforge::app

@@ -49,12 +49,14 @@ int report_interrupted(bool json) noexcept {
 
 /// Work that was begun. An interrupt ends the process if `abandoned`.
 struct CommandFrame::Work {
-  Work(const CommonOptions& common, std::unique_ptr<OutputFolder> out, bool abandoned)
-      : json(common.json),
-        stops_executors(abandoned),
-        folder(std::move(out)),
-        progress(std::in_place, common.quiet),
-        watch(SecondInterrupt::kExit, abandoned ? [this] { abandon(); } : std::function<void()>()) {
+  Work(bool prints_json, std::unique_ptr<OutputFolder> out, bool abandoned)
+      : json(prints_json), stops_executors(abandoned), folder(std::move(out)) {}
+
+  /// Shows progress on the terminal and takes its interrupts.
+  void face_terminal(bool quiet) {
+    progress.emplace(quiet);
+    watch.emplace(SecondInterrupt::kExit,
+                  stops_executors ? [this] { abandon(); } : std::function<void()>());
   }
 
   void begin_writing() {
@@ -78,20 +80,33 @@ struct CommandFrame::Work {
   std::once_flag accepted_once;
   std::mutex mutex;
   bool writing = false;
-  InterruptWatch watch;  ///< Last, so that it ends first.
+  std::optional<InterruptWatch> watch;  ///< Last, so that it ends first.
 };
 
 CommandFrame::CommandFrame(OptionSet& options)
     : options_(options), console_(options.common().json, options.common().quiet) {}
 
+CommandFrame::CommandFrame(OptionSet& options, RunControl host)
+    : options_(options), console_(false, true), host_(std::move(host)) {}
+
 CommandFrame::~CommandFrame() = default;
 
-void CommandFrame::begin_file(const fs::path& out) {
+void CommandFrame::start(std::unique_ptr<OutputFolder> folder, bool abandoned, bool quiet) {
+  work_ = std::make_unique<Work>(options_.common().json, std::move(folder), abandoned);
+  if (!host_) work_->face_terminal(quiet);
+}
+
+void CommandFrame::begin() {
   work_.reset();  // There is one watch for interrupts at a time.
+  start(nullptr, false, true);
+}
+
+void CommandFrame::begin_file(const fs::path& out) {
+  work_.reset();
   auto folder = out.empty() ? nullptr
                             : std::make_unique<OutputFolder>(fs::absolute(out).parent_path(),
                                                              FolderLock::Kind::kShared);
-  work_ = std::make_unique<Work>(options_.common(), std::move(folder), true);
+  start(std::move(folder), true, options_.common().quiet);
 }
 
 void CommandFrame::begin_writing() { work_->begin_writing(); }
@@ -99,29 +114,38 @@ void CommandFrame::begin_writing() { work_->begin_writing(); }
 const OutputFolder& CommandFrame::begin_folder(const fs::path& out) {
   work_.reset();
   auto folder = std::make_unique<OutputFolder>(out, FolderLock::Kind::kExclusive);
-  work_ = std::make_unique<Work>(options_.common(), std::move(folder), false);
+  start(std::move(folder), false, options_.common().quiet);
   return *work_->folder;
 }
 
 RunControl CommandFrame::control(std::function<void()> accepted) {
-  const auto show = work_->progress->sink();
-  if (!accepted) return {work_->watch.token(), show};
+  const RunControl shown =
+      host_ ? *host_ : RunControl(work_->watch->token(), work_->progress->sink());
+  if (!accepted) return shown;
   work_->accepted = std::move(accepted);
-  return {work_->watch.token(), [this, show](const Progress& progress) {
+  return {shown.stop_token(), [this, shown](const Progress& progress) {
             if (progress.done > 0.0) accept();
-            if (show) show(progress);
+            shown.report(progress);
           }};
 }
 
 void CommandFrame::accept() {
   std::call_once(work_->accepted_once, [this] {
-    work_->progress->wipe();
+    if (work_->progress) work_->progress->wipe();
     work_->accepted();
   });
 }
 
+std::stop_token CommandFrame::stop_token() const {
+  return host_ ? host_->stop_token() : work_->watch->token();
+}
+
+void CommandFrame::report_to_host(const Progress& progress) const {
+  if (host_) host_->report(progress);
+}
+
 Executor CommandFrame::stoppable(const Executor& executor) const {
-  return work_ && work_->stops_executors ? executor.with_stop(work_->watch.token()) : executor;
+  return work_ && work_->stops_executors ? executor.with_stop(stop_token()) : executor;
 }
 
 ChosenDevice CommandFrame::device_executor() const {

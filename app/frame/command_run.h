@@ -7,6 +7,8 @@
 #include <initializer_list>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -78,6 +80,9 @@ inline int exit_code(bool done, bool limits_met = true) {
 class CommandFrame {
  public:
   explicit CommandFrame(OptionSet& options);
+  /// A frame for another program, the host: it prints nothing and watches no signals. Progress goes
+  /// to `host`, which asks for the end of the work, too.
+  CommandFrame(OptionSet& options, RunControl host);
   ~CommandFrame();
   CommandFrame(const CommandFrame&) = delete;
   CommandFrame& operator=(const CommandFrame&) = delete;
@@ -85,6 +90,9 @@ class CommandFrame {
   [[nodiscard]] OptionSet& options() const { return options_; }
   [[nodiscard]] const Console& console() const { return console_; }
 
+  /// Begins work that keeps what it has done when it is interrupted, prints its own progress and
+  /// looks after its own files; ends earlier work.
+  void begin();
   /// Begins work that writes one file at its end, or none, and ends earlier work. An interrupt
   /// stops executors, too. Work that does not check for it within a second (a large system of
   /// equations, a library call) is abandoned by ending the process, unless the file is being
@@ -101,6 +109,9 @@ class CommandFrame {
   /// of work done or by accept(): the library has accepted its input.
   [[nodiscard]] RunControl control(std::function<void()> accepted = {});
   void accept();
+  [[nodiscard]] std::stop_token stop_token() const;
+  /// Progress of work that prints its own.
+  void report_to_host(const Progress& progress) const;
   [[nodiscard]] Executor executor() const { return stoppable(options_.executor()); }
   [[nodiscard]] ChosenDevice device_executor() const;
 
@@ -109,10 +120,12 @@ class CommandFrame {
 
  private:
   struct Work;
+  void start(std::unique_ptr<OutputFolder> folder, bool abandoned, bool quiet);
   [[nodiscard]] Executor stoppable(const Executor& executor) const;
 
   OptionSet& options_;
   const Console console_;
+  const std::optional<RunControl> host_;
   std::unique_ptr<Work> work_;
 };
 
@@ -138,6 +151,34 @@ int run_command(const Command<Settings>& command, const Arguments& arguments) {
   return run_framed(command.name, options, arguments,
                     [&](CommandFrame& frame) { return command.run(frame, settings); });
 }
+
+/// A command for a host that is no command line, such as Python.
+struct CommandCall {
+  Description options;  ///< With its arguments; the values are the defaults.
+  /// @throw InputError, RunError, Interrupted as the command.
+  std::function<CommandResult(const OptionValues& values, const RunControl& host)> run;
+};
+
+template <class Settings>
+CommandCall call_of(const Command<Settings>& command, const Settings& initial) {
+  return {description_of(initial),
+          [command, initial](const OptionValues& values, const RunControl& host) {
+            Settings settings = initial;
+            OptionSet options(command.name, command.description);
+            options.fields(settings);
+            options.take(values);
+            CommandFrame frame(options, host);
+            return command.run(frame, settings);
+          }};
+}
+
+CommandCall reflect_call();
+CommandCall view_call();
+CommandCall nest_call();
+CommandCall coupon_call();
+CommandCall info_call();
+/// @param program  words that start a command of a job in a process of its own.
+CommandCall batch_call(const Arguments& program);
 
 /// Note of an interrupted command whose work can be continued.
 inline constexpr const char* kContinueWithResume =

@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/image/transfer.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::python {
@@ -68,27 +71,108 @@ py::capsule owner_of(std::unique_ptr<Value> value) {
   return owner;
 }
 
+constexpr py::ssize_t kMostChannels = 4;
+
+/// Numbers of one type as light.
+template <class Number>
+class Light {
+ public:
+  static constexpr bool kEncoded = std::is_integral_v<Number>;
+  static constexpr double kWhite = kEncoded ? double{std::numeric_limits<Number>::max()} : 1.0;
+
+  Light() {
+    if constexpr (kEncoded) {
+      for (int value = 0; value <= std::numeric_limits<Number>::max(); ++value) {
+        table_.push_back(decode(value / kWhite));
+      }
+    }
+  }
+
+  [[nodiscard]] double of(Number value) const {
+    if constexpr (kEncoded) return table_[value];
+    return static_cast<double>(value);
+  }
+
+ private:
+  std::vector<double> table_;
+};
+
+/// The light of a pixel without its alpha. @param channels  of the pixel.
+template <class Number>
+double grey(const Number* pixel, int channels, const Light<Number>& light) {
+  if (channels < 3) return light.of(pixel[0]);
+  // Equal channels are used directly, as in files: the weighted sum rounds.
+  if (pixel[0] == pixel[1] && pixel[1] == pixel[2]) return light.of(pixel[0]);
+  return luminance_rec709({light.of(pixel[0]), light.of(pixel[1]), light.of(pixel[2])});
+}
+
+template <class Number>
+void require_light(std::span<const Number> values, const std::string& name) {
+  if constexpr (!std::is_integral_v<Number>) {
+    const auto bad = std::find_if(values.begin(), values.end(),
+                                  [](Number v) { return !(v >= 0) || !std::isfinite(v); });
+    if (bad == values.end()) return;
+    throw InputError(name + ": holds " + number_text(*bad) +
+                     ": light must be finite and not negative");
+  }
+}
+
+/// @throw InputError if nothing of a picture with transparent parts shows.
+void require_visible(const Image& image, const std::string& name, const Background& background) {
+  const auto behind = static_cast<float>(background.light());
+  const auto values = image.values();
+  if (std::any_of(values.begin(), values.end(), [&](float v) { return v != behind; })) return;
+  throw InputError(name + ": is " + (background == Background{} ? "black" : "of one brightness") +
+                   " all over, since transparency is flattened onto " + background.text() +
+                   ": use --background " + (background == Background{} ? "white" : "black"));
+}
+
+template <class Number>
+Image image_of(const py::array& array, const std::string& name, const Background& background) {
+  const py::array_t<Number, py::array::c_style | py::array::forcecast> numbers(array);
+  const std::span<const Number> values(numbers.data(), static_cast<std::size_t>(numbers.size()));
+  require_light(values, name);
+  const int channels = numbers.ndim() == 2 ? 1 : static_cast<int>(numbers.shape(2));
+  const bool has_alpha = channels == 2 || channels == 4;
+  const double behind = background.light();
+  const Light<Number> light;
+  bool open = false;
+  Image image(static_cast<int>(numbers.shape(1)), static_cast<int>(numbers.shape(0)));
+  const Number* pixel = values.data();
+  for (float& value : image.values()) {
+    const double whole = grey(pixel, channels, light);
+    const double alpha =
+        has_alpha ? static_cast<double>(pixel[channels - 1]) / Light<Number>::kWhite : 1.0;
+    if (alpha > 1.0) {
+      throw InputError(name + ": holds an alpha of " + number_text(alpha) + ": must be 0 to 1");
+    }
+    open = open || alpha < 1.0;
+    value = static_cast<float>(alpha * whole + (1.0 - alpha) * behind);
+    pixel += channels;
+  }
+  if (open) require_visible(image, name, background);
+  return image;
+}
+
 }  // namespace
 
-Image image_from(const py::array& array, const std::string& name) {
-  const bool floats = array.dtype().kind() == 'f';
-  if (!floats || array.ndim() != 2 || array.size() == 0) {
-    refuse(name, array, "must be (rows, columns) floats, linear light, 1 is white");
+Image image_from(const py::array& array, const std::string& name, const Background& background) {
+  const char kind = array.dtype().kind();
+  const auto bytes = array.dtype().itemsize();
+  const bool known = kind == 'f' || (kind == 'u' && bytes <= 2);
+  const bool shaped = array.ndim() == 2 ||
+                      (array.ndim() == 3 && array.shape(2) >= 1 && array.shape(2) <= kMostChannels);
+  if (!known || !shaped || array.size() == 0) {
+    refuse(name, array,
+           "must be (rows, columns), or those and 1 to 4 channels, of floats, linear light, 1 is "
+           "white, or of uint8 or uint16, sRGB-encoded");
   }
   if (std::max(array.shape(0), array.shape(1)) > kMaxImageSide) {
     refuse(name, array, "sides must be at most " + std::to_string(kMaxImageSide));
   }
-  const py::array_t<float, py::array::c_style | py::array::forcecast> light(array);
-  Image image(static_cast<int>(light.shape(1)), static_cast<int>(light.shape(0)));
-  const std::span values(light.data(), static_cast<std::size_t>(light.size()));
-  const auto bad = std::find_if(values.begin(), values.end(),
-                                [](float v) { return !(v >= 0.0F) || !std::isfinite(v); });
-  if (bad != values.end()) {
-    throw InputError(name + ": holds " + number_text(*bad) +
-                     ": light must be finite and not negative");
-  }
-  std::copy(values.begin(), values.end(), image.values().begin());
-  return image;
+  if (kind == 'f') return image_of<float>(array, name, background);
+  return bytes == 1 ? image_of<std::uint8_t>(array, name, background)
+                    : image_of<std::uint16_t>(array, name, background);
 }
 
 SurfaceMesh mesh_from(const py::array& vertices, const py::array& faces) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/image/image.h"
+#include "core/image/image_io.h"
 #include "core/mesh/surface_mesh.h"
 
 /// Conversion between numpy arrays and the libraries' values. Results and attributes share the
@@ -23,9 +24,15 @@ namespace py = pybind11;
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::int32_t, py::array::c_style | py::array::forcecast>;
 
-/// A picture in linear light from an (H, W) array of floats. @param name  for messages.
-/// @throw InputError if it has another shape or type, or a value that is negative or not finite.
-Image image_from(const py::array& array, const std::string& name);
+/// A picture in linear light from an array (H, W) or (H, W, C), where C is 1 (grey), 2 (grey,
+/// alpha), 3 (RGB) or 4 (RGB, alpha). Numbers are read as in files: floats are linear light and 1
+/// is white; uint8 and uint16 are sRGB-encoded and their largest value is white. RGB becomes its
+/// luminance (Rec. 709) in linear light; alpha is straight, 0 to 1 or to the largest value.
+/// @param name        for messages.
+/// @param background  what shows through where alpha is below 1.
+/// @throw InputError if it has another shape or type, a value that is negative or not finite, an
+///        alpha above 1, or shows nothing in front of the background.
+Image image_from(const py::array& array, const std::string& name, const Background& background);
 
 /// A mesh from (V, 3) coordinates, mm, and (F, 3) vertex numbers.
 /// @throw InputError if the shapes differ, a coordinate is not finite or a vertex number out of

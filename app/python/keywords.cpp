@@ -80,10 +80,17 @@ FieldValue value_from(const FieldSpec& spec, py::handle value) {
 }  // namespace
 
 Keywords::Keywords(std::string function, const Description& fields,
-                   const std::set<std::string>& withheld)
+                   const std::set<std::string>& withheld, Defaults defaults)
     : function_(std::move(function)) {
   app::OptionSet options(function_, "");
   options.add(fields);
+  const app::CommonOptions common_defaults;
+  defaults_ = {{"--threads", std::to_string(common_defaults.threads)},
+               {"--device", common_defaults.device}};
+  for (const Field& field : fields) {
+    const bool shown = field.kind != FieldKind::kFlag && defaults == Defaults::kOwn;
+    if (shown) defaults_[field.name] = value_text(field.get());
+  }
   try {
     options.parse({app::kListOptions});
   } catch (const app::ListedOptions& listed) {
@@ -107,7 +114,7 @@ const FieldSpec& Keywords::spec_of(const std::string& keyword) const {
   return *found;
 }
 
-app::OptionValues Keywords::values(const py::kwargs& given) const {
+app::OptionValues Keywords::values(const py::dict& given) const {
   app::OptionValues values;
   for (const auto& [key, value] : given) {
     const auto keyword = key.cast<std::string>();
@@ -126,7 +133,10 @@ app::OptionValues Keywords::values(const py::kwargs& given) const {
 
 std::string Keywords::text() const {
   std::string text;
-  for (const FieldSpec& spec : specs_) text += docstring_line(spec);
+  for (const FieldSpec& spec : specs_) {
+    const auto found = defaults_.find(spec.name);
+    text += docstring_line(spec, found == defaults_.end() ? "" : found->second);
+  }
   return text;
 }
 

@@ -3,6 +3,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -17,16 +18,22 @@ namespace py = pybind11;
 /// and without leading dashes. Limits and defaults are those of the options' descriptions.
 class Keywords {
  public:
+  enum class Defaults {
+    kOwn,      ///< The fields' values.
+    kOfALens,  ///< A lens's, which the fields' values are not.
+  };
+
   /// @param fields    the command's options.
   /// @param withheld  options that the function does not take, such as "--out".
-  Keywords(std::string function, const Description& fields, const std::set<std::string>& withheld);
+  Keywords(std::string function, const Description& fields, const std::set<std::string>& withheld,
+           Defaults defaults = Defaults::kOwn);
 
   /// The values of the options.
   /// @throw TypeError (Python's) naming function and keyword for an unknown keyword or a value of
   ///        the wrong type; InputError naming keyword, value and rule.
-  [[nodiscard]] app::OptionValues values(const py::kwargs& given) const;
+  [[nodiscard]] app::OptionValues values(const py::dict& given) const;
 
-  /// Describes the keywords and their values, for a docstring.
+  /// Describes the keywords, their values and defaults, for a docstring.
   [[nodiscard]] std::string text() const;
 
  private:
@@ -34,6 +41,7 @@ class Keywords {
 
   std::string function_;
   std::vector<FieldSpec> specs_;
+  std::map<std::string, std::string> defaults_;  ///< By option; empty texts where there is none.
 };
 
 }  // namespace lensforge::python

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,7 +31,7 @@
 #include "design/render.h"
 #include "design/setup/option_tables.h"
 
-/// The class Lens, and the commands as functions.
+/// A lens, and the commands as functions.
 namespace lensforge::python {
 namespace {
 
@@ -45,14 +47,14 @@ struct LensObject {
 
 std::shared_ptr<LensObject> read(const fs::path& folder) {
   auto lens = std::make_shared<LensObject>();
-  lens->design.lens = run_released([&](const std::stop_token&) { return read_lens(folder); });
+  lens->design.lens = run_released([&](const RunControl&) { return read_lens(folder); });
   lens->design.status = DesignResult::Status::kDone;
   lens->folder = folder;
   return lens;
 }
 
 void save(LensObject& lens, const fs::path& folder, bool force) {
-  run_released([&](const std::stop_token&) {
+  run_released([&](const RunControl&) {
     app::refuse_to_overwrite(folder, app::EarlierDesign::in(folder), false, force);
     const app::OutputFolder output(folder, FolderLock::Kind::kExclusive);
     app::write_design(folder, lens.design, app::Console(false, true));
@@ -72,7 +74,7 @@ ColorImage displayed(const Image& image) {
 
 /// Target, projected picture, that of the part as made if it is known, and the surface.
 py::bytes png_of(const LensObject& lens) {
-  const std::vector<unsigned char> png = run_released([&](const std::stop_token&) {
+  const std::vector<unsigned char> png = run_released([&](const RunControl&) {
     const auto& made = lens.design.made;
     return encode_png(displayed(app::draw_overview(lens.lens(), made ? &made->picture : nullptr)));
   });
@@ -90,71 +92,65 @@ std::string repr(const LensObject& object) {
 const LensObject& object_of(const py::object& self) { return self.cast<const LensObject&>(); }
 
 void add_views(py::class_<LensObject, std::shared_ptr<LensObject>>& type) {
-  const auto view = [&type](const char* name, auto value, const char* text) {
-    type.def_property_readonly(
-        name,
-        [value](const py::object& self) { return view_of(value(object_of(self).lens()), self); },
-        text);
+  const auto view = [&type](const char* name, auto value) {
+    type.def_property_readonly(name, [value](const py::object& self) {
+      return view_of(value(object_of(self).lens()), self);
+    });
   };
   view(
-      "vertices", [](const Lens& lens) -> auto& { return lens.surface.vertices; },
-      "(V, 3) float64: the optical surface, mm in the lens frame; a read-only view.");
+      "vertices", [](const Lens& lens) -> auto& { return lens.surface.vertices; });
   view(
-      "faces", [](const Lens& lens) -> auto& { return lens.surface.triangles; },
-      "(F, 3) int32: vertex numbers, counter-clockwise seen from +z; a read-only view.");
+      "faces", [](const Lens& lens) -> auto& { return lens.surface.triangles; });
   view(
-      "target", [](const Lens& lens) -> auto& { return lens.target; },
-      "(H, W) float32: the wanted picture, linear light, 1 is white; a read-only view.");
+      "target", [](const Lens& lens) -> auto& { return lens.target; });
   view(
-      "projected", [](const Lens& lens) -> auto& { return lens.render; },
-      "(H, W) float32: the picture that the lens projects, as target; a read-only view.");
+      "projected", [](const Lens& lens) -> auto& { return lens.render; });
 }
 
-/// The folder of a Lens or a path. @throw InputError if the lens has none yet.
-fs::path folder_of(const py::object& lens) {
-  if (!py::isinstance<LensObject>(lens)) return lens.cast<fs::path>();
-  const fs::path& folder = object_of(lens).folder;
-  if (folder.empty()) throw InputError("the lens is in no folder yet; save() it first");
-  return folder;
+bool same(const SurfaceMesh& a, const SurfaceMesh& b) {
+  return a.vertices.cols() == b.vertices.cols() && a.triangles.cols() == b.triangles.cols() &&
+         a.vertices == b.vertices && a.triangles == b.triangles;
 }
 
-/// A Lens itself, or the one in the folder of this path. @throw InputError as read_lens() does.
-py::object lens_from(const py::object& lens) {
-  if (py::isinstance<LensObject>(lens)) return lens;
-  return py::cast(read(lens.cast<fs::path>()));
+/// True for lenses of the same setup, model, surface and pictures, wherever they come from.
+bool equal(const LensObject& first, const LensObject& second) {
+  const Lens& a = first.lens();
+  const Lens& b = second.lens();
+  return a.model == b.model && a.setup == b.setup && same(a.surface, b.surface) &&
+         a.target == b.target && a.render == b.render;
+}
+
+/// Writes the lens alone, which read() reads back.
+void write(const LensObject& lens, const fs::path& folder) {
+  run_released([&](const RunControl&) { write_lens(lens.lens(), folder); });
 }
 
 }  // namespace
 
 void add_lens(py::module_& module) {
-  py::class_<LensObject, std::shared_ptr<LensObject>> type(
-      module, "Lens",
-      "A designed lens: what design() returns, or what a lens folder holds. It does not change.");
-  type.def(py::init(&read), py::arg("folder"), "Reads a lens folder.");
+  py::class_<LensObject, std::shared_ptr<LensObject>> type(module, "Lens");
   add_views(type);
+  type.def_property_readonly("setup", [](const LensObject& self) { return self.lens().setup; });
+  type.def_property_readonly("model",
+                             [](const LensObject& self) { return model_name(self.lens().model); });
   type.def_property_readonly(
-      "setup", [](const LensObject& self) { return self.lens().setup; },
-      "Setup: light, screen and picture.");
-  type.def_property_readonly(
-      "model", [](const LensObject& self) { return model_name(self.lens().model); },
-      "str: the surface model that it was designed with.");
-  type.def_property_readonly(
-      "metrics", [](const LensObject& self) { return object_from(metrics_json(self.lens())); },
-      "dict: for every surface model how close its picture is to the target.");
-  type.def_property_readonly(
-      "provenance",
-      [](const LensObject& self) { return object_from(self.lens().provenance.json()); },
-      "dict: the program, options and outcome that the lens comes from.");
-  type.def_property_readonly(
+      "metrics", [](const LensObject& self) { return object_from(metrics_json(self.lens())); });
+  type.def_property_readonly("provenance", [](const LensObject& self) {
+    return object_from(self.lens().provenance.json());
+  });
+  type.def_property(
       "folder",
       [](const LensObject& self) {
         return self.folder.empty() ? py::object(py::none()) : py::cast(self.folder);
       },
-      "pathlib.Path where the lens lies, None until it is saved.");
-  type.def("save", &save, py::arg("folder"), py::arg("force") = false,
-           "Writes the lens folder, as the design command does; force replaces an earlier lens.");
-  type.def("_repr_png_", &png_of);
+      [](LensObject& self, const fs::path& folder) { self.folder = folder; });
+  type.def("save", &save);
+  type.def("write", &write);
+  type.def("copy", [](const LensObject& self) { return std::make_shared<LensObject>(self); });
+  type.def("equals", &equal);
+  type.def("png", &png_of);
   type.def("__repr__", &repr);
+  module.def("read_lens", &read);
 }
 
 namespace {
@@ -165,32 +161,20 @@ namespace {
 /// A function's own argument in messages and in a lens's provenance.
 constexpr const char* kArgument = "picture";
 
-RunControl stopping_at(const std::stop_token& stop) { return {stop, {}}; }
-
 // --- design
 
-bool is_path(const py::object& object) {
-  return py::isinstance<py::str>(object) || py::hasattr(object, "__fspath__");
-}
-
-/// @throw TypeError (Python's) for what numpy makes no array of.
-py::array array_from(const py::object& picture) {
-  py::array array = py::array::ensure(picture);
-  if (!array) throw py::type_error("picture: must be a path or an array");
-  return array;
-}
-
-py::object design(const py::object& picture, app::OptionValues values) {
+std::shared_ptr<LensObject> design(const py::object& picture, app::OptionValues values,
+                                   const py::object& progress) {
+  const bool is_array = py::isinstance<py::array>(picture);
   app::DesignSettings settings;
   app::OptionSet options("design", "");
   options.fields(settings);
   values.insert({{"TARGET", kArgument}, {"--out", "."}});
   options.take(values);
-  const Image given = is_path(picture) ? Image() : image_from(array_from(picture), kArgument);
-  settings.target = is_path(picture) ? picture.cast<fs::path>().string() : kArgument;
+  const Image given = is_array ? image_from(picture, kArgument, settings.background) : Image();
+  settings.target = is_array ? kArgument : picture.cast<fs::path>().string();
   auto made = std::make_shared<LensObject>();
-  made->design = run_released([&](const std::stop_token& stop) {
-    const RunControl control = stopping_at(stop);
+  made->design = run_released(progress, [&](const RunControl& control) {
     const Image target = given.empty() ? app::read_target(settings, control).image : given;
     app::settle(options, settings, target, control);
     const app::ChosenDevice device = options.device_executor();
@@ -200,7 +184,7 @@ py::object design(const py::object& picture, app::OptionValues values) {
     result.lens.provenance = app::design_provenance(options, device, settings.design, result);
     return result;
   });
-  return py::cast(std::move(made));
+  return made;
 }
 
 // --- render
@@ -225,9 +209,8 @@ Image picture_of(const Lens& lens, const RenderOptions& render, const Executor& 
   return image;
 }
 
-py::array render(const py::object& source, const app::OptionValues& values) {
-  const py::object kept = lens_from(source);
-  const Lens& lens = kept.cast<const LensObject&>().lens();
+py::array render(const LensObject& source, const app::OptionValues& values) {
+  const Lens& lens = source.lens();
   RenderOptions chosen{.model = lens.model, .setup = lens.setup};
   app::OptionSet options("render", "");
   options.add(options_of(chosen));
@@ -235,22 +218,23 @@ py::array render(const py::object& source, const app::OptionValues& values) {
   if (chosen.model == SurfaceModel::kSpline && !lens.spline) {
     throw InputError("model spline: must be facet or smooth: the lens is no spline");
   }
-  Image image = run_released([&](const std::stop_token& stop) {
+  Image image = run_released([&](const RunControl& control) {
     require_wall_above(lens.surface, chosen.setup);
-    return picture_of(lens, chosen, options.device_executor().executor.with_stop(stop));
+    const Executor executor = options.device_executor().executor;
+    return picture_of(lens, chosen, executor.with_stop(control.stop_token()));
   });
   return array_of(std::move(image));
 }
 
 // --- cam
 
-py::object cam(const py::object& lens, const app::OptionValues& values) {
+py::object cam(const fs::path& lens, const app::OptionValues& values, const py::object& progress) {
   app::CamSettings settings;
   app::OptionSet options("cam", "");
   options.fields(settings);
   options.take(values);
-  settings.source = folder_of(lens).string();
-  const CamResult result = run_released([&](const std::stop_token& stop) {
+  settings.source = lens.string();
+  const CamResult result = run_released(progress, [&](const RunControl& control) {
     const FolderLock reading(settings.source, FolderLock::Kind::kShared);
     const Lens designed = read_lens(settings.source);
     app::settle(options, settings);
@@ -261,7 +245,7 @@ py::object cam(const py::object& lens, const app::OptionValues& values) {
                          settings.folder());
     const app::OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
     folder.remove_partial_files(is_name_of_cut);
-    return make_cut(designed, settings.cam, folder.path(), executor, stopping_at(stop));
+    return make_cut(designed, settings.cam, folder.path(), executor, control);
   });
   const nlohmann::json cut = {{"warnings", result.report.warnings},
                               {"files", app::files_json(result.files)},
@@ -271,20 +255,19 @@ py::object cam(const py::object& lens, const app::OptionValues& values) {
 
 // --- export
 
-py::object export_file(const py::object& lens, const fs::path& out,
-                       const app::OptionValues& values) {
+py::object export_file(const fs::path& lens, const fs::path& out, const app::OptionValues& values,
+                       const py::object& progress) {
   app::ExportSettings settings;
   app::OptionSet options("export", "");
   options.fields(settings);
   options.take(values);
-  const fs::path folder = folder_of(lens);
-  const ExportResult result = run_released([&](const std::stop_token& stop) {
+  const ExportResult result = run_released(progress, [&](const RunControl& control) {
     app::require_fitting_options(options, export_format(settings.options, out));
     validate(settings.options, out);
-    const ExportSource source = read_export_source(folder, settings.surface);
+    const ExportSource source = read_export_source(lens, settings.surface);
     const app::OutputFolder into(fs::absolute(out).parent_path(), FolderLock::Kind::kShared);
-    return export_lens(source, out, settings.options, options.executor().with_stop(stop),
-                       stopping_at(stop));
+    return export_lens(source, out, settings.options,
+                       options.executor().with_stop(control.stop_token()), control);
   });
   nlohmann::json report = app::export_report(result).json;
   report["format"] = result.format;
@@ -292,60 +275,89 @@ py::object export_file(const py::object& lens, const fs::path& out,
   return object_from(report);
 }
 
+// --- commands that are run as they are
+
+/// Values of arguments, by their names on the command line.
+app::OptionValues argument_values(const py::dict& given) {
+  app::OptionValues values;
+  for (const auto& [name, value] : given) {
+    FieldValue& taken = values[name.cast<std::string>()];
+    if (py::isinstance<py::list>(value)) {
+      std::vector<std::string> texts;
+      for (const py::handle text : value) texts.push_back(text.cast<fs::path>().string());
+      taken = std::move(texts);
+    } else {
+      taken = value.cast<fs::path>().string();
+    }
+  }
+  return values;
+}
+
+/// What the command prints with --json, without its name, and its warnings.
+py::object run_command(const app::CommandCall& call, const app::OptionValues& values,
+                       const py::object& progress) {
+  const app::CommandResult result =
+      run_released(progress, [&](const RunControl& control) { return call.run(values, control); });
+  nlohmann::json json = result.json;
+  if (!json.contains("warnings") && !result.warnings.empty()) json["warnings"] = result.warnings;
+  return object_from(json);
+}
+
+/// Adds a function of this name: name(arguments, options, progress).
+void add_command(py::module_& module, const char* name, const app::CommandCall& call,
+                 const std::set<std::string>& withheld) {
+  const Keywords keywords(name, call.options, withheld);
+  module.attr((std::string(name) + "_options").c_str()) = keywords.text();
+  module.def(name, [call, keywords](const py::dict& given, const py::dict& options,
+                                    const py::object& progress) {
+    app::OptionValues values = keywords.values(options);
+    values.merge(argument_values(given));
+    return run_command(call, values, progress);
+  });
+}
+
+void add_plain_commands(py::module_& module) {
+  add_command(module, "reflect", app::reflect_call(), {"--out", "--device"});
+  add_command(module, "view", app::view_call(), {"--out", "--device"});
+  add_command(module, "nest", app::nest_call(), {"--out", "--device"});
+  add_command(module, "coupon", app::coupon_call(), {"--out", "--device"});
+  add_command(module, "info", app::info_call(), {"--threads", "--device"});
+  // A job runs in a process of its own, since it may crash or use up the memory.
+  const auto program = py::module_::import("lensforge._program").attr("WORDS");
+  add_command(module, "batch", app::batch_call(program.cast<std::vector<std::string>>()),
+              {"--out", "--grid", "--device"});
+}
+
 }  // namespace
 
 void add_commands(py::module_& module) {
   const Keywords of_design("design", description_of(app::DesignSettings()),
                            {"--out", "--live", "--resume", "--force"});
-  module.def(
-      "design",
-      [of_design](const py::object& picture, const py::kwargs& options) {
-        return design(picture, of_design.values(options));
-      },
-      py::arg("picture"),
-      ("design(picture, **options) -> Lens: shapes a lens that projects a picture.\n\n"
-       "picture: the path of a file, or an (H, W) array of floats, linear light, 1 is white.\n"
-       "Raises InputError, RunError. The options are those of lensforge design:\n" +
-       of_design.text())
-          .c_str());
+  module.attr("design_options") = of_design.text();
+  module.def("design", [of_design](const py::object& picture, const py::dict& options,
+                                   const py::object& progress) {
+    return design(picture, of_design.values(options), progress);
+  });
   RenderOptions usual;
-  const Keywords of_render("render", options_of(usual), {});
-  module.def(
-      "render",
-      [of_render](const py::object& lens, const py::kwargs& options) {
-        return render(lens, of_render.values(options));
-      },
-      py::arg("lens"),
-      ("render(lens, **options): what a Lens, or the one in a folder, projects.\n\n"
-       "Returns (H, W) float32, linear light, 1 is the target's white. The options are those of\n"
-       "lensforge render:\n" +
-       of_render.text())
-          .c_str());
+  const Keywords of_render("render", options_of(usual), {}, Keywords::Defaults::kOfALens);
+  module.attr("render_options") = of_render.text();
+  module.def("render", [of_render](const LensObject& lens, const py::dict& options) {
+    return render(lens, of_render.values(options));
+  });
   const Keywords of_cam("cam", description_of(app::CamSettings()),
                         {"--show-workshop", "--compare", "--device"});
-  module.def(
-      "cam",
-      [of_cam](const py::object& lens, const py::kwargs& options) {
-        return cam(lens, of_cam.values(options));
-      },
-      py::arg("lens"),
-      ("cam(lens, **options) -> dict: programs, milled surface and report, in the lens folder's\n"
-       "cam/.\n\nlens: a saved Lens or a lens folder's path. Returns \"files\", \"warnings\" and\n"
-       "\"report\", as report.json has it. The options are those of lensforge cam:\n" +
-       of_cam.text())
-          .c_str());
-  const Keywords of_export("export", description_of(app::ExportSettings()), {"--out"});
-  module.def(
-      "export",
-      [of_export](const py::object& lens, const fs::path& out, const py::kwargs& options) {
-        return export_file(lens, out, of_export.values(options));
-      },
-      py::arg("lens"), py::arg("out"),
-      ("export(lens, out, **options) -> dict: writes a solid, mesh or height map.\n\n"
-       "lens: a saved Lens or a lens folder's path; out: the file, its ending says the format.\n"
-       "Returns what was written. The options are those of lensforge export:\n" +
-       of_export.text())
-          .c_str());
+  module.attr("cam_options") = of_cam.text();
+  module.def("cam",
+             [of_cam](const fs::path& lens, const py::dict& options, const py::object& progress) {
+               return cam(lens, of_cam.values(options), progress);
+             });
+  const Keywords of_export("export", description_of(app::ExportSettings()), {"--out", "--device"});
+  module.attr("export_options") = of_export.text();
+  module.def("export", [of_export](const fs::path& lens, const fs::path& out,
+                                   const py::dict& options, const py::object& progress) {
+    return export_file(lens, out, of_export.values(options), progress);
+  });
+  add_plain_commands(module);
 }
 
 }  // namespace lensforge::python

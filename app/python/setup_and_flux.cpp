@@ -2,9 +2,12 @@
 #include <pybind11/pybind11.h>
 
 #include <algorithm>
+#include <cstring>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "app/frame/common_output.h"
 #include "app/python/arrays.h"
@@ -12,9 +15,12 @@
 #include "app/python/keywords.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/image/rasters.h"
 #include "core/lens/optical_surface.h"
 #include "core/lens/setup_json.h"
+#include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
+#include "core/schema/json.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"
 #include "design/setup/option_tables.h"
@@ -51,42 +57,67 @@ OpticalSetup make_setup(int columns, int rows, const app::OptionValues& values) 
 
 py::tuple pair_of(const Eigen::Vector2d& size) { return py::make_tuple(size.x(), size.y()); }
 
+/// All of a setup as Python values: lens.json's text, and a height map's columns, rows, samples and
+/// size, which are in a file of their own there.
+py::tuple state_of(const OpticalSetup& setup) {
+  nlohmann::json document = setup_json(setup);
+  py::object heights = py::none();
+  const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
+  if (map != nullptr) {
+    const HeightGrid& grid = map->spline->grid();
+    const auto* const bytes = reinterpret_cast<const char*>(grid.heights.data());
+    heights = py::make_tuple(grid.columns, grid.rows,
+                             py::bytes(bytes, grid.heights.size() * sizeof(float)), map->size.x(),
+                             map->size.y());
+    document["front"] = {{"type", "flat"}, {"z", 0}};
+  }
+  return py::make_tuple(document.dump(), heights);
+}
+
+HeightFront height_front(const py::tuple& state) {
+  HeightGrid grid{state[0].cast<int>(), state[1].cast<int>(), {}};
+  const auto bytes = state[2].cast<std::string>();
+  grid.heights.resize(bytes.size() / sizeof(float));
+  std::memcpy(grid.heights.data(), bytes.data(), grid.heights.size() * sizeof(float));
+  return {std::make_shared<HeightSpline>(std::move(grid)),
+          {state[3].cast<double>(), state[4].cast<double>()}};
+}
+
+/// @throw InputError if the state is none.
+OpticalSetup setup_of(const std::string& text, const py::object& heights) {
+  const nlohmann::json document = parse_json(text, "setup");
+  OpticalSetup setup = read_setup(JsonFields(document, "setup"));
+  if (!heights.is_none()) setup.front = height_front(heights.cast<py::tuple>());
+  validate(setup);
+  return setup;
+}
+
 }  // namespace
 
 void add_setup(py::module_& module) {
   DesignOptions usual;
   const Keywords keywords("Setup", options_of(usual), {"--threads", "--device"});
-  py::class_<OpticalSetup> type(
-      module, "Setup",
-      "Everything between the lamp and the wall but the surface. It does not change.");
-  const std::string text =
-      "Setup(columns, rows, **options): light, lens and screen for a picture of so many pixels.\n"
-      "The options are those of lensforge design:\n" +
-      keywords.text();
-  type.def(py::init([keywords](int columns, int rows, const py::kwargs& given) {
-             return make_setup(columns, rows, keywords.values(given));
-           }),
-           py::arg("columns"), py::arg("rows"), text.c_str());
+  py::class_<OpticalSetup> type(module, "Setup");
   type.def_property_readonly(
-      "pixels", [](const OpticalSetup& s) { return py::make_tuple(s.pixels.x(), s.pixels.y()); },
-      "(columns, rows) of the picture.");
-  type.def_property_readonly(
-      "lens_size", [](const OpticalSetup& s) { return pair_of(s.lens_size); },
-      "(width, height) of the lens, mm.");
-  type.def_property_readonly(
-      "image_size", [](const OpticalSetup& s) { return pair_of(s.image_size); },
-      "(width, height) of the picture on the screen, mm.");
-  type.def_property_readonly(
-      "focal_length", [](const OpticalSetup& s) { return s.focal_length; },
-      "z of the picture's centre, mm in the lens frame.");
-  type.def(
-      "to_dict", [](const OpticalSetup& s) { return object_from(setup_json(s)); },
-      "All of it, as lens.json has it.");
+      "pixels", [](const OpticalSetup& s) { return py::make_tuple(s.pixels.x(), s.pixels.y()); });
+  type.def_property_readonly("lens_size",
+                             [](const OpticalSetup& s) { return pair_of(s.lens_size); });
+  type.def_property_readonly("image_size",
+                             [](const OpticalSetup& s) { return pair_of(s.image_size); });
+  type.def_property_readonly("focal_length", [](const OpticalSetup& s) { return s.focal_length; });
+  type.def("to_dict", [](const OpticalSetup& s) { return object_from(setup_json(s)); });
+  type.def("state", &state_of);
+  type.def("equals", [](const OpticalSetup& a, const OpticalSetup& b) { return a == b; });
   type.def("__repr__", [](const OpticalSetup& s) {
     return "<lensforge.Setup " + app::fixed(s.lens_size.x(), 1) + " x " +
            app::fixed(s.lens_size.y(), 1) + " mm, " + app::size_text(s.pixels.x(), s.pixels.y()) +
            " pixels>";
   });
+  module.attr("setup_options") = keywords.text();
+  module.def("make_setup", [keywords](int columns, int rows, const py::dict& given) {
+    return make_setup(columns, rows, keywords.values(given));
+  });
+  module.def("setup_of", &setup_of);
 }
 
 namespace {
@@ -112,9 +143,9 @@ py::array flux_image(const py::array& vertices, const py::array& faces, const Op
                      const std::string& model, int threads) {
   const SurfaceMesh mesh = mesh_from(vertices, faces);
   const SurfaceModel chosen = model_named(model);
-  auto flux = run_released([&](const std::stop_token& stop) {
+  auto flux = run_released([&](const RunControl& control) {
     require_wall_above(mesh, setup);
-    return flux_of_surface(mesh, setup, chosen, stoppable(threads, stop));
+    return flux_of_surface(mesh, setup, chosen, stoppable(threads, control.stop_token()));
   });
   return array_of(std::move(flux), setup.pixels);
 }
@@ -125,35 +156,19 @@ py::array flux_image_vjp(const py::array& vertices, const py::array& faces,
   const SurfaceMesh mesh = mesh_from(vertices, faces);
   const SurfaceModel chosen = model_named(model);
   const std::vector<double> pixels = pixels_from(cotangent, "cotangent", setup.pixels);
-  auto gradient = run_released([&](const std::stop_token& stop) {
+  auto gradient = run_released([&](const RunControl& control) {
     require_wall_above(mesh, setup);
-    return flux_of_surface_adjoint(mesh, setup, chosen, pixels, stoppable(threads, stop));
+    return flux_of_surface_adjoint(mesh, setup, chosen, pixels,
+                                   stoppable(threads, control.stop_token()));
   });
   return array_of(std::move(gradient));
 }
 
-constexpr const char* kFluxText =
-    "The flux that a mesh sends to every pixel, as shares of what the lens takes.\n\n"
-    "vertices: (V, 3) floats, mm in the lens frame; faces: (F, 3) integers, counter-clockwise "
-    "seen\n"
-    "from +z; model: \"smooth\", normals at the vertices, or \"facet\".\n"
-    "Returns (H, W) float64, row 0 on top; the sum is the share that lands in the picture.\n"
-    "Raises InputError for arrays of another shape, or a screen that is not beyond the surface.";
-
-constexpr const char* kAdjointText =
-    "The vector-Jacobian product of flux_image().\n\n"
-    "cotangent: (H, W), derivatives of a scalar by flux_image()'s pixels.\n"
-    "Returns (V, 3) float64, derivatives of that scalar by the vertices, per mm.\n"
-    "Raises InputError as flux_image() does, and for a setup with an outline.";
-
 }  // namespace
 
 void add_flux(py::module_& module) {
-  module.def("flux_image", &flux_image, py::arg("vertices"), py::arg("faces"), py::arg("setup"),
-             py::arg("model") = "smooth", py::arg("threads") = 0, kFluxText);
-  module.def("flux_image_vjp", &flux_image_vjp, py::arg("vertices"), py::arg("faces"),
-             py::arg("setup"), py::arg("cotangent"), py::arg("model") = "smooth",
-             py::arg("threads") = 0, kAdjointText);
+  module.def("flux_image", &flux_image);
+  module.def("flux_image_vjp", &flux_image_vjp);
 }
 
 }  // namespace lensforge::python

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/missing_file.h"
 
 namespace lensforge {
 namespace {
@@ -79,7 +80,9 @@ const char* kind_of(mode_t mode) {
 }
 
 [[noreturn]] void fail_to_read(const fs::path& path, int error) {
-  throw InputError(path.string() + ": cannot be read: " + system_reason(error));
+  const std::string message = path.string() + ": cannot be read: " + system_reason(error);
+  if (error == ENOENT) throw MissingFile(message, path);
+  throw InputError(message);
 }
 
 void require_regular(const struct stat& status, const fs::path& path) {

@@ -20,6 +20,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/io/missing_file.h"
 
 namespace lensforge {
 namespace {
@@ -123,7 +124,10 @@ constexpr std::chrono::milliseconds kBetweenAttempts{2};
 FolderLock::FolderLock(const fs::path& folder, Kind kind) {
   open(folder);
   if (!folder_.open()) {
-    throw InputError(folder.string() + ": cannot be opened: " + system_reason(errno));
+    const int error = errno;
+    const std::string message = folder.string() + ": cannot be opened: " + system_reason(error);
+    if (error == ENOENT) throw MissingFile(message, folder);
+    throw InputError(message);
   }
   if (!attempt(kind)) refuse_held(folder);
 }

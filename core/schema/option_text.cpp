@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <regex>
 
 #include "core/error.h"
 #include "core/text/number_text.h"
@@ -117,12 +118,27 @@ std::string python_type(const FieldSpec& option) {
   }
 }
 
-std::string docstring_line(const FieldSpec& option) {
-  std::string text =
-      "\n  " + keyword_of(option.name) + " (" + python_type(option) + "): " + option.help;
+std::string docstring_line(const FieldSpec& option, const std::string& initial) {
+  std::string text = "\n  " + keyword_of(option.name) + " (" + python_type(option) + "): ";
+  text += in_keywords(option.help);
   if (option.is_number()) text += "; " + option.limits.rule();
   if (!option.words.empty()) text += "; " + joined(option.words, ", ");
+  if (!initial.empty()) text += "; default " + initial;
   return text;
+}
+
+std::string in_keywords(const std::string& message) {
+  // Behind other characters, "--" is a part of a file's name.
+  static const std::regex option(R"((^|[\s"'(,;|])--([a-z][a-z0-9-]*))");
+  std::string text;
+  auto rest = message.begin();
+  for (std::sregex_iterator found(message.begin(), message.end(), option), none; found != none;
+       ++found) {
+    text.append(rest, found->prefix().second).append((*found)[1]);
+    text += keyword_of((*found)[2]);
+    rest = (*found)[0].second;
+  }
+  return text.append(rest, message.end());
 }
 
 }  // namespace lensforge

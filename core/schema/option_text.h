@@ -30,7 +30,11 @@ std::string keyword_of(const std::string& option);
 /// Python's type of an option: "float, mm, or a text with its unit".
 std::string python_type(const FieldSpec& option);
 
-/// An option as a line of a docstring: keyword, type, help and limits or words.
-std::string docstring_line(const FieldSpec& option);
+/// An option as a line of a docstring: keyword, type, help, limits or words, and default.
+/// @param initial  the default in words; empty if there is none.
+std::string docstring_line(const FieldSpec& option, const std::string& initial = "");
+
+/// The message with Python's keywords for options: "image_width" for "--image-width".
+std::string in_keywords(const std::string& message);
 
 }  // namespace lensforge

@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <stop_token>
 #include <string>
+#include <vector>
 
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
@@ -64,6 +66,35 @@ TEST(CommandFrame, WithoutAResultPrintsNotesAlone) {
   EXPECT_EQ(ending.exit_code, kInterrupted);
   EXPECT_EQ(ending.out, "");
   EXPECT_EQ(ending.err, "lensforge: nothing was sent\n");
+}
+
+TEST(CommandFrame, AHostHasItsProgressAndTheResultAndNothingIsPrinted) {
+  const TempFolder folder;
+  const CommandCall call = call_of<Settings>({"try", "Tries.",
+                                              [](CommandFrame& frame, Settings& settings) {
+                                                frame.console().note("held");
+                                                frame.console().begin();
+                                                frame.begin_folder(settings.out);
+                                                frame.control().report({"cut", 1.0, 2.0, ""});
+                                                frame.begin();
+                                                frame.report_to_host({"batch", 2.0, 2.0, ""});
+                                                EXPECT_TRUE(frame.stop_token().stop_requested());
+                                                return with_everything(frame, settings);
+                                              }},
+                                             {});
+  std::vector<std::string> stages;
+  std::stop_source stop;
+  stop.request_stop();
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  const CommandResult result =
+      call.run({{"--out", (folder / "new").string()}},
+               {stop.get_token(), [&](const Progress& told) { stages.push_back(told.stage); }});
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(stages, (std::vector<std::string>{"cut", "batch"}));
+  EXPECT_EQ(result.json, nlohmann::json({{"size", 3}}));
+  EXPECT_EQ(call.options.at("--out").help, "where");
 }
 
 TEST(CommandFrame, InterruptedWorkLeavesNoFolderBehind) {

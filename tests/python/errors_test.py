@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bad input is a ValueError with the command's own line, keywords for options; a wrong keyword a TypeError."""
 
+import errno
 import os
+import pickle
 import subprocess
 import tempfile
 import unittest
@@ -39,8 +41,53 @@ class Errors(unittest.TestCase):
         self.assert_refused("black all over", lensforge.design, 0 * FLAT)
         self.assert_refused("nan", lensforge.design, FLAT * np.nan)
         self.assert_refused("not negative", lensforge.design, -FLAT)
-        self.assert_refused("must be (rows, columns) floats", lensforge.design, FLAT.astype(np.uint8))
-        self.assert_refused("must be (rows, columns) floats", lensforge.design, np.ones((8, 8, 3)))
+        for picture in (FLAT.astype(np.int32), np.ones((8, 8, 5)), np.ones(8), np.ones((0, 8))):
+            self.assert_refused("must be (rows, columns), or", lensforge.design, picture)
+        for picture in (None, 3, object(), FLAT.astype(object)):
+            with self.assertRaisesRegex(TypeError, "must be a path, an array or a PIL picture"):
+                lensforge.design(picture)
+
+    def test_files_that_are_missing(self):
+        missing = {
+            "nowhere.png": lambda: lensforge.design("nowhere.png"),
+            "nowhere.exr": lambda: lensforge.design(FLAT, source_picture="nowhere.exr", source_angle=1),
+            "nowhere.toml": lambda: lensforge.design(FLAT, made_by="nowhere.toml"),
+            "nowhere/lens.json": lambda: lensforge.Lens("nowhere"),
+            "nowhere.stl": lambda: lensforge.reflect("nowhere.stl", evaluate=True),
+            "nowhere.ngc": lambda: lensforge.info(Path("nowhere.ngc")),
+            "nowhere.jsonl": lambda: lensforge.batch("nowhere.jsonl", "out"),
+            "nowhere": lambda: lensforge.cam("nowhere"),
+        }
+        for name, call in missing.items():
+            with self.subTest(file=name), self.assertRaises(FileNotFoundError) as caught:
+                call()
+            error = caught.exception
+            self.assertIsInstance(error, lensforge.MissingFileError)
+            self.assertIsInstance(error, lensforge.InputError)
+            self.assertIsInstance(error, ValueError)
+            self.assertEqual((error.errno, error.filename), (errno.ENOENT, name))
+            self.assertRegex(str(error), f"^{name}: cannot be (read|opened): No such file")
+            again = pickle.loads(pickle.dumps(error))
+            self.assertEqual((type(again), str(again)), (type(error), str(error)))
+
+    def test_messages_name_keywords(self):
+        calls = [
+            lambda: lensforge.Setup(8, 8, focal=1.0),
+            lambda: lensforge.design(FLAT, robust=True),
+            lambda: lensforge.design(FLAT, image_width=-1),
+            lambda: lensforge.nest([], "out"),
+            lambda: lensforge.reflect("a.stl"),
+        ]
+        words = ["focal 1", "robust: needs made_by", "image_width -1", "DIR: is required", "out: is missing"]
+        for call, word in zip(calls, words, strict=True):
+            with self.assertRaises(lensforge.InputError) as caught:
+                call()
+            self.assertIn(word, str(caught.exception))
+            self.assertNotIn("--", str(caught.exception))
+
+    def test_a_path_with_dashes_stays_as_it_is(self):
+        with self.assertRaisesRegex(FileNotFoundError, "^a--b/--focal.png: cannot be read"):
+            lensforge.design("a--b/--focal.png")
 
     def test_keywords(self):
         with self.assertRaisesRegex(TypeError, "unexpected keyword argument 'wdth'"):
@@ -81,13 +128,17 @@ class Errors(unittest.TestCase):
         self.assert_refused("vertex number -1", flux, points, face - 1, setup)
         self.assert_refused("finite", flux, points + np.inf, face, setup)
         self.assert_refused("model", flux, points, face, setup, "spline")
-        self.assert_refused("--focal", flux, points + 100, face, setup)
+        self.assert_refused("focal", flux, points + 100, face, setup)
+        with self.assertRaisesRegex(TypeError, "must be a Setup"):
+            flux(points, face, None)
+        with self.assertRaisesRegex(TypeError, "must be a whole number"):
+            flux(points, face, setup, threads=1.5)
         self.assert_refused("must be (8, 8)", lensforge.flux_image_vjp, points, face, setup,
                             np.ones((8, 9)))
 
     def test_setups(self):
         self.assert_refused("columns 0", lensforge.Setup, 0, 8)
-        self.assert_refused("--focal", lensforge.Setup, 8, 8, focal=1.0)
+        self.assert_refused("focal", lensforge.Setup, 8, 8, focal=1.0)
 
     def test_folders(self):
         self.assert_refused("nowhere", lensforge.Lens, "nowhere")

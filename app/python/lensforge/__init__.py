@@ -1,30 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a picture to the milled lens that projects it."""
 
-from ._lensforge import (
-    InputError,
-    Lens,
-    RunError,
-    Setup,
-    __version__,
-    cam,
-    design,
-    export,
-    flux_image,
-    flux_image_vjp,
-    render,
-)
+from ._errors import InputError, MissingFileError, RunError
+from ._functions import batch, cam, coupon, design, export, info, nest, reflect, render, view
+from ._lens import Lens, Setup, flux_image, flux_image_vjp
+from ._lensforge import __version__
 
 __all__ = [
     "InputError",
     "Lens",
+    "MissingFileError",
     "RunError",
     "Setup",
     "__version__",
+    "batch",
     "cam",
+    "coupon",
     "design",
     "export",
     "flux_image",
     "flux_image_vjp",
+    "info",
+    "nest",
+    "reflect",
     "render",
+    "view",
 ]
+
+# Where they are imported from, for messages and pickles.
+for _name in __all__:
+    if _name != "__version__":
+        globals()[_name].__module__ = __name__

@@ -2,24 +2,34 @@
 """Types of the module; help(lensforge.design) and its like list the options."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Union
+from typing import Any, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
 
+class _Picture(Protocol):
+    """A picture of PIL, or anything else of which numpy makes an array."""
+
+    @property
+    def __array_interface__(self) -> dict[str, Any]: ...
+
 _Path = Union[str, "os.PathLike[str]"]
 _Option = Union[bool, int, float, _Path, Sequence[float]]
 _Linear = npt.NDArray[np.float32]
+_Progress = Union[None, bool, Callable[[str, float, float], object]]
 
 __version__: str
 
 class InputError(ValueError):
-    """Bad input: names the option, array or file, its value and the rule that it broke."""
+    """Bad input: names the keyword, array or file, its value and the rule that it broke."""
 
 class RunError(RuntimeError):
     """Something outside of the program failed while it ran: a full disk, a lost file."""
+
+class MissingFileError(FileNotFoundError, InputError):
+    """A file or folder that is to be read does not exist; an InputError, too."""
 
 class Setup:
     """Everything between the lamp and the wall but the surface."""
@@ -60,22 +70,45 @@ class Lens:
     def save(self, folder: _Path, force: bool = False) -> None: ...
     def _repr_png_(self) -> bytes: ...
 
-def design(picture: _Path | npt.NDArray[np.floating[Any]], **options: _Option) -> Lens: ...
+def design(
+    picture: _Path | _Picture | npt.ArrayLike, *, progress: _Progress = None, **options: _Option
+) -> Lens: ...
 def render(lens: Lens | _Path, **options: _Option) -> _Linear: ...
-def cam(lens: Lens | _Path, **options: _Option) -> dict[str, Any]: ...
-def export(lens: Lens | _Path, out: _Path, **options: _Option) -> dict[str, Any]: ...
+def cam(lens: Lens | _Path, *, progress: _Progress = None, **options: _Option) -> dict[str, Any]: ...
+def export(
+    lens: Lens | _Path, out: _Path, *, progress: _Progress = None, **options: _Option
+) -> dict[str, Any]: ...
+def view(
+    lens: Lens | _Path, out: _Path, *, progress: _Progress = None, **options: _Option
+) -> dict[str, Any]: ...
+def nest(
+    lenses: Iterable[Lens | _Path], out: _Path, *, progress: _Progress = None, **options: _Option
+) -> dict[str, Any]: ...
+def coupon(out: _Path, *, progress: _Progress = None, **options: _Option) -> dict[str, Any]: ...
+def reflect(
+    mesh: _Path, out: _Path | None = None, *, progress: _Progress = None, **options: _Option
+) -> dict[str, Any]: ...
+def info(source: Lens | _Path, **options: _Option) -> dict[str, Any]: ...
+def batch(
+    jobs: _Path | Iterable[Mapping[str, Any]],
+    out: _Path,
+    *,
+    grid: Mapping[str, Any] | None = None,
+    progress: _Progress = None,
+    **options: _Option,
+) -> dict[str, Any]: ...
 def flux_image(
-    vertices: npt.NDArray[np.floating[Any]],
-    faces: npt.NDArray[np.integer[Any]],
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
     setup: Setup,
     model: str = "smooth",
     threads: int = 0,
 ) -> npt.NDArray[np.float64]: ...
 def flux_image_vjp(
-    vertices: npt.NDArray[np.floating[Any]],
-    faces: npt.NDArray[np.integer[Any]],
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
     setup: Setup,
-    cotangent: npt.NDArray[np.floating[Any]],
+    cotangent: npt.ArrayLike,
     model: str = "smooth",
     threads: int = 0,
 ) -> npt.NDArray[np.float64]: ...

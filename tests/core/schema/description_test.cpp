@@ -251,6 +251,8 @@ TEST(Description, OneLineIsEnoughForANewField) {
   EXPECT_EQ(manual_item(field),
             ".It Fl -spare-wheels Ar NUMBER\nunder the lid; pairs, 0 to 8.\nDefault: 4.\n");
   EXPECT_EQ(docstring_line(field), "\n  spare_wheels (float): under the lid; 0 to 8");
+  EXPECT_EQ(docstring_line(field, "4"),
+            "\n  spare_wheels (float): under the lid; 0 to 8; default 4");
   field.set(value_of(field, "0.1"));
   EXPECT_EQ(wheels, 0.1);
   EXPECT_EQ(message_of<InputError>([&] { (void)value_of(field, "9"); }),
@@ -267,6 +269,13 @@ TEST(Description, OneLineIsEnoughForANewField) {
   wheels = 9.0;
   read_json(fields, JsonFields(document, "toy.json"));
   EXPECT_EQ(wheels, 0.1);
+}
+
+TEST(Description, MessagesForPythonNameKeywords) {
+  EXPECT_EQ(in_keywords("--image-width -1: must be 0 or more; (--focal 300 works)"),
+            "image_width -1: must be 0 or more; (focal 300 works)");
+  EXPECT_EQ(in_keywords("a--b/--c.png: -- is no option"), "a--b/--c.png: -- is no option");
+  EXPECT_EQ(in_keywords(""), "");
 }
 
 }  // namespace
