@@ -148,7 +148,7 @@ class GuidedOptimization::Probes {
   /// True if no barrier refuses the vertices; `gradient` then holds the objective's.
   bool look(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& gradient) {
     control_.report(
-        {"curvatures", double{1} * ++pictures_, 0.0, "picture " + std::to_string(pictures_)});
+        {"curvatures", double{1} * ++pictures_, 0.0, "curvature " + std::to_string(pictures_)});
     return stage_.evaluate(vertices, gradient).feasible;
   }
 
@@ -244,6 +244,7 @@ LbfgsSummary GuidedOptimization::run(const LbfgsOptions& options, const Observer
   } else {
     scales = measure_scales(mesh, control);
   }
+  control.report({"iterations", 0.0, 0.0, "first step"});
   return stage_->minimize(options, observe, mesh.vertices);
 }
 

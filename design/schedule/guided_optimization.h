@@ -88,7 +88,7 @@ class GuidedOptimization {
   /// Improves `mesh` by at most `options.max_iterations` steps. Unknown scales are measured on the
   /// mesh first. The result depends on mesh and scales alone, so a resumed run takes the same
   /// steps.
-  /// @param control  takes reports while scales are measured.
+  /// @param control  takes reports until the first iteration.
   /// @throw Interrupted if the executor is stopped; `mesh` then holds the best surface so far.
   LbfgsSummary run(const LbfgsOptions& options, const Observer& observe, StepScales& scales,
                    SurfaceMesh& mesh, const RunControl& control = {});

@@ -355,6 +355,7 @@ SurfaceMesh spline_start(const DesignTask& task, const Level& level, const Surfa
   const LevelProblem problem = make_problem(task, level, 0);
   for (double share = level.knot_share;; share -= kShareStep) {
     SurfaceMesh net = fitted(mesh, share);
+    control.report({"spline", 0.0, 0.0, "checking"});
     GuidedOptimization stage(net, problem.setup, problem.target, problem.objective, task.executor);
     if (std::isfinite(stage.value(net))) return net;
     if (share > 0.0) continue;

@@ -268,7 +268,7 @@ bool follow_picture(const LevelSite& site, const GuidedOptimization::Observer& o
   optimizer.max_iterations = site.level.iterations;
   optimizer.history = kHistory;
   const LbfgsSummary summary = site.stage.run(optimizer, observe, state.scales, state.mesh,
-                                              site.log.step("measuring curvatures"));
+                                              site.log.step("starting iterations"));
   using Status = LbfgsSummary::Status;
   if (summary.status == Status::kInfeasibleStart) refuse_start(site.task);
   return summary.status != Status::kStopped;
@@ -417,7 +417,10 @@ bool run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
       stage = std::make_unique<GuidedOptimization>(state.mesh, problem.setup, problem.target,
                                                    problem.objective, task.executor);
     }
-    if (corrects) state.value = stage->value(state.mesh);
+    if (corrects) {
+      log.report_step("evaluating the surface");
+      state.value = stage->value(state.mesh);
+    }
     if (!run_round({task, level, problem, *stage, log}, state)) return false;
     if (state.round < level.rounds) save(task, log, state);
   }
