@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -44,15 +46,20 @@ void take_surface(const DesignTask& task, SurfaceMesh mesh, Lens& lens) {
   rest_on_thickness(lens.surface, task.options.thickness);
 }
 
+/// Reports the pictures of a lens by name; one that is empty reports nothing.
+using PictureReports = std::function<RunControl(const std::string& picture)>;
+
 /// @param look  effort of its pictures.
-Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Executor& executor) {
+Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Executor& executor,
+               const PictureReports& reports) {
   Lens lens;
   take_surface(task, std::move(mesh), lens);
   lens.setup = task.setup;
   lens.target = task.target;
   for (const SurfaceModel model : models_of(lens)) {
     Image* const render = model == lens.model ? &lens.render : nullptr;
-    lens.metrics[model] = evaluate(lens, model, render, executor, look);
+    const RunControl control = reports ? reports("as " + model_name(model)) : RunControl();
+    lens.metrics[model] = evaluate(lens, model, render, executor, look, control);
   }
   if (task.limit) lens.source_limit = task.limit->metrics;
   return lens;
@@ -70,12 +77,14 @@ std::optional<DesignResult::Made> made_part(const DesignOptions& options, const 
   return made;
 }
 
-std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& executor) {
+std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& executor,
+                                              const PictureReports& reports) {
   const Spectrum& spectrum = lens.setup.spectrum;
   if (spectrum.none()) return std::nullopt;
   std::vector<Image> pictures;
   for (const LightColor& color : light_colors(lens.setup)) {
-    std::vector<double> flux = flux_of_lens(lens, color.setup, executor);
+    const RunControl control = reports("in colour " + std::to_string(pictures.size() + 1));
+    std::vector<double> flux = flux_of_lens(lens, color.setup, executor, control);
     for (double& value : flux) value *= lens.target.total();
     pictures.push_back(image_of(flux, lens.target.columns(), lens.target.rows()));
   }
@@ -103,12 +112,19 @@ bool run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
 
 /// The lens after the last level, with its checks. @throw Interrupted
 DesignResult finished(const DesignTask& task, const DesignLog& log, const SurfaceMesh& mesh) {
-  log.report_rendering();
+  const std::string what = "rendering the lens";
+  log.report_rendering(what);
+  const auto reports = [&](const std::string& picture) {
+    return log.rendering(what + " " + picture);
+  };
   DesignResult result;
   result.status = DesignResult::Status::kDone;
-  result.lens = make_lens(task, mesh, Look::kThorough, task.executor);
-  if (task.limit) result.source = check_source(result.lens, task.executor);
-  result.colors = colors_of(result.lens, task.executor);
+  result.lens = make_lens(task, mesh, Look::kThorough, task.executor, reports);
+  if (task.limit) {
+    result.source = check_source(result.lens, task.executor, log.rendering("checking the source"));
+  }
+  result.colors = colors_of(result.lens, task.executor, reports);
+  if (task.options.made_by) log.report_rendering("rendering the part");
   result.made = made_part(task.options, result.lens, task.executor);
   return result;
 }
@@ -117,7 +133,7 @@ DesignResult finished(const DesignTask& task, const DesignLog& log, const Surfac
 DesignResult unfinished(const DesignTask& task, SurfaceMesh mesh, const Executor& executor) {
   DesignResult result;
   result.message = "interrupted";
-  result.lens = make_lens(task, std::move(mesh), Look::kBrief, executor);
+  result.lens = make_lens(task, std::move(mesh), Look::kBrief, executor, {});
   return result;
 }
 

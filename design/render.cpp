@@ -149,17 +149,18 @@ ImageMetrics evaluate(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
 }
 
 std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
-                                 const Executor& executor) {
+                                 const Executor& executor, const RunControl& control) {
   if (lens.model != SurfaceModel::kSpline) {
     return flux_of_surface(lens.surface, setup, lens.model, executor);
   }
-  return picture_under(setup, points_for(lens.surface, setup), [&](const OpticalSetup& point) {
+  const auto picture = [&](const OpticalSetup& point) {
     return render_spline(*lens.spline, point, executor);
-  });
+  };
+  return picture_under(setup, points_for(lens.surface, setup), picture, control);
 }
 
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
-                      const Executor& executor, Look look) {
+                      const Executor& executor, Look look, const RunControl& control) {
   if (look == Look::kBrief) {
     return judged(result_of(brief_flux(lens, model, executor), lens.setup, lens.target.total()),
                   lens.target, rendered);
@@ -168,7 +169,7 @@ ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
     return evaluate(lens.surface, lens.setup, model, lens.target, rendered, executor);
   }
   return judged(
-      result_of(flux_of_lens(lens, lens.setup, executor), lens.setup, lens.target.total()),
+      result_of(flux_of_lens(lens, lens.setup, executor, control), lens.setup, lens.target.total()),
       lens.target, rendered);
 }
 

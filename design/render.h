@@ -52,8 +52,10 @@ enum class Look {
 };
 
 /// evaluate() of a lens under one of its models.
+/// @param control  takes a report of every picture that a thorough look sums.
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,
-                      const Executor& executor, Look look = Look::kThorough);
+                      const Executor& executor, Look look = Look::kThorough,
+                      const RunControl& control = {});
 
 /// The same for a smooth surface given by its own normals at the vertices, 3 × V with z > 0, which
 /// do not depend on the triangles between them. Computed on the CPU.
@@ -91,8 +93,9 @@ Eigen::Matrix3Xd flux_of_surface_adjoint(const SurfaceMesh& mesh, const OpticalS
                                          const Executor& executor);
 
 /// Flux per pixel of a lens in another setup, as shares of the lens's total, under its own model.
+/// @param control  takes a report of every picture that is summed.
 std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
-                                 const Executor& executor);
+                                 const Executor& executor, const RunControl& control = {});
 
 /// Distance on the screen between the landing points of the spectrum's first and last wavelength,
 /// mm.

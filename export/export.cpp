@@ -242,7 +242,9 @@ SplineSolid fitted_splines(const Job& job) {
   solid.fit = SplineFit{options, {}};
   options.picture = goal_of(wanted, lens.setup);
   solid.net = fit_spline_net(surface, options, job.executor, job.control);
+  job.control.report({"spline normals", 0.0, 0.0, ""});
   solid.fit->bound = normal_bound(surface, options.normal_tolerance);
+  job.control.report({"picture of the solid", 0.0, 0.0, ""});
   solid.picture = picture_of(solid.net, lens, job.executor);
   return solid;
 }
@@ -254,6 +256,7 @@ SplineSolid own_spline(const Job& job) {
   SplineSolid solid;
   solid.net = lens.setup.outline ? patch_of(*lens.spline, job.executor)
                                  : net_of(*lens.spline, job.executor);
+  job.control.report({"picture of the solid", 0.0, 0.0, ""});
   solid.picture = evaluate(lens, SurfaceModel::kSpline, nullptr, job.executor);
   return solid;
 }
@@ -271,6 +274,7 @@ SplineSolid write_splines(const Job& job) {
                      "both; export a mesh instead, as --out lens.stl");
   }
   require_rectangle(lens.surface, height_field_outline(lens.surface, name), name);
+  job.control.report({"closed mesh", 0.0, 0.0, ""});
   const double mesh_volume =
       enclosed_volume(closed_solid(part_of(job).mesh, name, lens.setup.front));
   SplineSolid solid = lens.spline ? own_spline(job) : fitted_splines(job);

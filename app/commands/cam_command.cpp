@@ -23,6 +23,7 @@
 #include "core/io/lens_folder.h"
 #include "core/schema/description.h"
 #include "core/schema/toml_document.h"
+#include "machine/gcode.h"
 
 namespace lensforge::app {
 
@@ -78,6 +79,18 @@ nlohmann::json job_json(const OptionSet& options, const JobResult& result,
 
 std::string z_text(double z_offset) {
   return "  Z         program Z = lens z + " + fixed(z_offset, 4) + " mm\n";
+}
+
+std::string next_step(const fs::path& page, const JobResult& job, const CamOptions& cam,
+                      int missed) {
+  std::string note = "look at " + page.string();
+  const std::string& dialect = cam.post.reader.name;
+  const bool sendable = dialect == grbl_dialect().name || dialect == grblhal_dialect().name;
+  if (!sendable || missed > 0 || job.files.empty()) return note;
+  note += "; then: lensforge send " + shell_word(job.files.front().string()) + " --dry-run";
+  // Without the option send reads programs for Grbl.
+  if (dialect != grbl_dialect().name) note += " --dialect " + dialect;
+  return note;
 }
 
 namespace {
@@ -139,8 +152,14 @@ CommandResult cut(CommandFrame& frame, const CamSettings& settings, const Lens& 
       make_cut(lens, cam, settings.folder(), frame.executor(), frame.control());
   nlohmann::json json = job_json(options, result, result.report.warnings);
   if (result.done()) json["report"] = report_json(result.report);
-  return {json, result.done() ? summary_text(settings.folder(), result) : result.message + "\n",
-          exit_code(result.done(), result.report.verdict.missed() == 0), result.report.warnings};
+  const int missed = result.report.verdict.missed();
+  CommandResult outcome{
+      json, result.done() ? summary_text(settings.folder(), result) : result.message + "\n",
+      exit_code(result.done(), missed == 0), result.report.warnings};
+  if (result.done()) {
+    outcome.notes.push_back(next_step(settings.folder() / cam_file::kPage, result, cam, missed));
+  }
+  return outcome;
 }
 
 std::string choice_text(const ReportChoice& choice) {
@@ -172,7 +191,9 @@ CommandResult compare(CommandFrame& frame, const CamSettings& settings, const Le
     text += result.advice + "\n";
   }
   if (result.complete) json["files"].push_back(result.page.string());
-  return {json, text, exit_code(result.complete)};
+  CommandResult outcome{json, text, exit_code(result.complete)};
+  if (result.complete) outcome.notes.push_back("look at " + result.page.string());
+  return outcome;
 }
 
 nlohmann::json workshop_json(const Workshop& workshop) {

@@ -514,6 +514,7 @@ CommandResult finish(CommandFrame& frame, const ChosenDevice& device, const Desi
   const bool replaces = earlier.lens && !earlier.is_of(fingerprint_text(result.fingerprint));
   const bool keeps = replaces && !done;
   if (result.lens.surface.triangle_count() > 0 && !keeps) {
+    frame.control().report({"writing the lens", 0.0, 0.0, ""});
     write_design(folder, result, frame.console());
   }
   std::error_code ignored;

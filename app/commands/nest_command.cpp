@@ -203,8 +203,13 @@ CommandResult run(CommandFrame& frame, NestSettings& settings) {
   announce_work(estimate, frame.console(), "the cuts take");
   const NestResult result =
       make_nest(lenses, settings.nest, settings.out, frame.executor(), frame.control());
-  return {summary_json(options, result, sources), summary_text(settings.out, result),
-          exit_code(result.done(), result.missed() == 0), warnings_of(result)};
+  CommandResult outcome{summary_json(options, result, sources), summary_text(settings.out, result),
+                        exit_code(result.done(), result.missed() == 0), warnings_of(result)};
+  if (result.done()) {
+    outcome.notes.push_back(next_step(fs::path(settings.out) / nest_file::kLayout, result,
+                                      settings.nest.cam, result.missed()));
+  }
+  return outcome;
 }
 
 Command<NestSettings> command() {

@@ -175,7 +175,9 @@ CommandResult shape(CommandFrame& frame, ReflectSettings& settings) {
   if (result.done()) fs::remove(settings.reflect.checkpoint, ignored);
   CommandResult outcome{json, result_text(settings, result),
                         exit_code(result.done(), result.unmet.empty()), result.unmet};
-  if (!result.done()) outcome.notes.emplace_back(kContinueWithResume);
+  outcome.notes.push_back(
+      result.done() ? "look at " + (folder.path() / reflect::reflect_file::kViews).string()
+                    : kContinueWithResume);
   return outcome;
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -109,7 +110,13 @@ namespace {
 
 constexpr std::chrono::milliseconds kBarInterval{100};
 constexpr std::chrono::seconds kLineInterval{5};
-constexpr int kBarWidth = 24;
+constexpr int kMaxBarWidth = 24;
+constexpr int kMinBarWidth = 8;  ///< With less room there is no bar.
+constexpr int kBarEnds = 3;      ///< Characters around the bar.
+
+/// Minimum span of a pace, seconds and share of the total: the first steps of a stage are uneven.
+constexpr double kMinPaceSeconds = 3.0;
+constexpr double kMinPaceShare = 0.01;
 
 std::string clock_text(double seconds) {
   const int whole = static_cast<int>(seconds);
@@ -128,7 +135,29 @@ std::string bar(double share, int width) {
 
 }  // namespace
 
-std::string progress_line(const Progress& progress, double seconds, int bar_width) {
+void StagePace::take(const Progress& progress, double seconds) {
+  const bool goes_on =
+      progress.stage == stage_ && progress.total == total_ && progress.done >= last_.done;
+  if (goes_on && progress.done > last_.done) last_ = {progress.done, seconds};
+  if (goes_on && last_.done > first_.done) return;
+  stage_ = progress.stage;
+  total_ = progress.total;
+  first_ = {progress.done, seconds};
+  last_ = first_;
+}
+
+std::optional<double> StagePace::left(double seconds) const {
+  const double done = last_.done - first_.done;
+  const double span = last_.seconds - first_.seconds;
+  const bool known =
+      total_ > last_.done && done >= kMinPaceShare * total_ && span >= kMinPaceSeconds;
+  if (!known) return std::nullopt;
+  const double left = (total_ - last_.done) / done * span - (seconds - last_.seconds);
+  return left > 0.0 ? std::optional(left) : std::nullopt;
+}
+
+std::string progress_line(const Progress& progress, double seconds, std::optional<double> left,
+                          int bar_width) {
   std::string line = printable_line(progress.stage) + "  ";
   if (progress.total > 0.0) {
     const double share = std::clamp(progress.done / progress.total, 0.0, 1.0);
@@ -136,7 +165,9 @@ std::string progress_line(const Progress& progress, double seconds, int bar_widt
     line += std::to_string(static_cast<int>(100.0 * share)) + " %  ";
   }
   if (!progress.detail.empty()) line += printable_line(progress.detail) + "  ";
-  return line + clock_text(seconds);
+  line += clock_text(seconds);
+  if (left) line.append(", ").append(clock_text(std::round(*left))).append(" left");
+  return line;
 }
 
 ProgressDisplay::ProgressDisplay(bool quiet)
@@ -167,6 +198,7 @@ void ProgressDisplay::wipe() {
 void ProgressDisplay::show(const Progress& progress) {
   const std::lock_guard lock(mutex_);
   last_ = progress;
+  pace_.take(progress, std::chrono::duration<double>(Clock::now() - start_).count());
   draw();
 }
 
@@ -179,19 +211,31 @@ void ProgressDisplay::redraw_until(const std::stop_token& stop) {
   }
 }
 
+/// The words come first where the terminal is too narrow for a whole bar.
+std::string ProgressDisplay::line(double seconds) const {
+  const std::optional<double> left = pace_.left(seconds);
+  std::string words = progress_line(last_, seconds, left, 0);
+  if (!terminal_) return words;
+  const std::size_t width = terminal_width() - 1;
+  const int room = static_cast<int>(width) - static_cast<int>(words.size()) - kBarEnds;
+  if (room < kMinBarWidth) {
+    words.resize(std::min(words.size(), width));
+    return words;
+  }
+  return progress_line(last_, seconds, left, std::min(room, kMaxBarWidth));
+}
+
 void ProgressDisplay::draw() {
   const Clock::time_point now = Clock::now();
   const Clock::duration wait = terminal_ ? Clock::duration(kBarInterval) : kLineInterval;
   if (now - shown_ < wait) return;
   shown_ = now;
-  const double seconds = std::chrono::duration<double>(now - start_).count();
-  std::string line = progress_line(last_, seconds, terminal_ ? kBarWidth : 0);
+  const std::string text = line(std::chrono::duration<double>(now - start_).count());
   if (terminal_) {
-    line.resize(std::min(line.size(), terminal_width() - 1));
-    std::fprintf(stderr, "\r%s\033[K", line.c_str());
+    std::fprintf(stderr, "\r%s\033[K", text.c_str());
     bar_drawn_ = true;
   } else {
-    std::fprintf(stderr, "%s\n", line.c_str());
+    std::fprintf(stderr, "%s\n", text.c_str());
   }
 }
 

@@ -7,6 +7,7 @@
 #include <functional>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -50,6 +51,32 @@ class Console {
   mutable std::vector<std::string> held_;
 };
 
+/// Estimates the time left of the running stage from its pace so far. Seconds are those of any
+/// clock that never runs backwards.
+class StagePace {
+ public:
+  /// Takes a report. Another stage, another total or less work done begins a new pace. The pace
+  /// counts from the last report before work begins to advance.
+  void take(const Progress& progress, double seconds);
+
+  /// Seconds left, above 0. Nothing if the total is unknown or reached, before the stage has
+  /// advanced for 3 s and by 1 % of its total, and once the stage takes longer than its pace
+  /// predicted.
+  [[nodiscard]] std::optional<double> left(double seconds) const;
+
+ private:
+  /// Work done, and when it was first reported.
+  struct Mark {
+    double done = 0.0;
+    double seconds = 0.0;
+  };
+
+  std::string stage_;
+  double total_ = 0.0;
+  Mark first_;
+  Mark last_;
+};
+
 /// Shows progress on stderr: a bar on a terminal, a line every few seconds otherwise, nothing if
 /// `quiet`. The latest report is shown again while no new one arrives. The destructor erases the
 /// bar.
@@ -71,6 +98,7 @@ class ProgressDisplay {
 
   void show(const Progress& progress);
   void draw();
+  [[nodiscard]] std::string line(double seconds) const;
   void redraw_until(const std::stop_token& stop);
 
   const bool quiet_;
@@ -79,12 +107,15 @@ class ProgressDisplay {
   std::mutex mutex_;
   std::condition_variable_any ended_;
   Progress last_;
+  StagePace pace_;
   Clock::time_point shown_;
   bool bar_drawn_ = false;
   std::jthread redrawer_;
 };
 
-/// "stage  57 %  detail  0:34", with a bar of `bar_width` characters if that is above 0.
-std::string progress_line(const Progress& progress, double seconds, int bar_width);
+/// "stage  57 %  detail  0:34, 0:25 left", with a bar of `bar_width` characters if that is above 0.
+/// @param seconds  since the start. @param left  seconds left of the stage; nothing if unknown.
+std::string progress_line(const Progress& progress, double seconds, std::optional<double> left,
+                          int bar_width);
 
 }  // namespace lensforge::app

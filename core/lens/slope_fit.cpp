@@ -3,9 +3,11 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -228,7 +230,14 @@ double SlopeFit::least_area(const SplinePlan& plan) const {
 
 Eigen::MatrixXd SlopeFit::solve() const {
   Eigen::VectorXd volumes(grid_.u.values.rows());
+  const std::thread::id caller = std::this_thread::get_id();
+  std::atomic<std::int64_t> begun = 0;
   const auto wanted_along = [&](std::int64_t i) {
+    const auto before = static_cast<double>(begun++);
+    // A sink need not expect several threads.
+    if (std::this_thread::get_id() == caller) {
+      control_.report({"spline heights", before, static_cast<double>(volumes.size()), ""});
+    }
     const PlanLine line = grid_.plan_line(plan_, i);
     Eigen::MatrixX3d wanted = Eigen::MatrixX3d::Zero(line.xy.cols(), 3);
     volumes[i] = 0.0;

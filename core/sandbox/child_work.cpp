@@ -36,7 +36,8 @@
 namespace lensforge {
 namespace {
 
-/// Interval of checks for a stop request, and minimum interval of the child's reports.
+/// Interval of checks for a stop request, and minimum interval of the child's reports of one
+/// detail.
 constexpr int kPollMilliseconds = 100;
 constexpr std::chrono::milliseconds kReportInterval{50};
 
@@ -78,18 +79,20 @@ class WorkPipe {
   void report(const Progress& progress) {
     const std::lock_guard lock(mutex_);
     const auto now = std::chrono::steady_clock::now();
-    if (now - sent_ < kReportInterval) return;
+    if (now - sent_ < kReportInterval && progress.detail == detail_) return;
     sent_ = now;
+    detail_ = progress.detail;
     const Share share{progress.done, progress.total};
-    std::array<char, sizeof share> bytes{};
+    std::string bytes(sizeof share, '\0');
     std::memcpy(bytes.data(), &share, sizeof share);
-    send(descriptor_, Frame::kProgress, {bytes.data(), bytes.size()});
+    send(descriptor_, Frame::kProgress, bytes + detail_);
   }
 
  private:
   int descriptor_;
   std::mutex mutex_;
   std::chrono::steady_clock::time_point sent_;
+  std::string detail_;
 };
 
 /// Address space used by this process, bytes; nothing if unknown.
@@ -229,6 +232,14 @@ std::optional<std::pair<Frame, std::string_view>> next_frame(const std::string& 
 struct Answer {
   std::optional<std::string> result;
   Share share;
+  std::string detail;
+
+  /// @param text  of a frame kProgress: a share and a detail.
+  void take_progress(std::string_view text) {
+    if (text.size() < sizeof share) return;
+    std::memcpy(&share, text.data(), sizeof share);
+    detail = text.substr(sizeof share);
+  }
 };
 
 /// Takes whole frames out of `bytes`. @throw what the child's work threw, and what `take` throws.
@@ -241,7 +252,7 @@ void take_frames(std::string& bytes, const PieceSink& take, Answer& answer) {
     if (frame->first == Frame::kInputError) throw InputError(std::string(text));
     if (frame->first == Frame::kRunError) throw RunError(std::string(text));
     if (frame->first == Frame::kFailure) throw ChildFailure(std::string(text));
-    if (frame->first == Frame::kProgress) std::memcpy(&answer.share, text.data(), sizeof(Share));
+    if (frame->first == Frame::kProgress) answer.take_progress(text);
   }
   bytes.erase(0, at);
 }
@@ -282,7 +293,7 @@ std::string run_in_child(const std::string& stage, const ChildLimits& limits,
   for (std::string bytes; !answer.result && child.receive(bytes);) {
     if (control.stop_requested()) throw Interrupted();
     take_frames(bytes, take, answer);
-    control.report({stage, answer.share.done, answer.share.total, ""});
+    control.report({stage, answer.share.done, answer.share.total, answer.detail});
   }
   const int status = child.wait();
   if (control.stop_requested()) throw Interrupted();

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <numeric>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -44,9 +45,10 @@ int source_point_count(const OpticalSetup& setup, double z) {
   return wanted < kMaxPoints ? std::max(kMinPoints, static_cast<int>(wanted)) : kMaxPoints;
 }
 
-std::vector<double> picture_under(const OpticalSetup& setup, int count,
-                                  const PointPicture& picture) {
+std::vector<double> picture_under(const OpticalSetup& setup, int count, const PointPicture& picture,
+                                  const RunControl& control) {
   if (setup.extent.none() && setup.spectrum.none()) return picture(setup);
+  int done = 0;
   std::vector<double> sum(static_cast<std::size_t>(setup.pixels.prod()), 0.0);
   for (const LightColor& color : light_colors(setup)) {
     for (const SourcePoint& point : source_points(setup.extent, count)) {
@@ -54,6 +56,7 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count,
       const std::vector<double> one =
           picture(setup.extent.none() ? whole : lit_from(whole, point.at));
       for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += color.share * point.share * one[i];
+      control.report({"picture", double{1} * ++done, 0.0, "view " + std::to_string(done)});
     }
   }
   return sum;
@@ -87,7 +90,7 @@ Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, 
                    picture_by_convolution(setup, z, picture, executor));
 }
 
-SourceCheck check_source(const Lens& lens, const Executor& executor) {
+SourceCheck check_source(const Lens& lens, const Executor& executor, const RunControl& control) {
   const double z = surface_height(lens);
   const auto point = [&](const OpticalSetup& setup) {
     return point_picture(lens, setup, executor);
@@ -100,7 +103,7 @@ SourceCheck check_source(const Lens& lens, const Executor& executor) {
     const Eigen::Vector2i& pixels = lens.setup.pixels;
     return compare(image_of(other, pixels.x(), pixels.y()), lens.render).mae;
   };
-  check.halving = difference(picture_under(lens.setup, count / 2, point));
+  check.halving = difference(picture_under(lens.setup, count / 2, point, control));
   check.convolution = difference(picture_by_convolution(lens.setup, z, point, executor));
   return check;
 }

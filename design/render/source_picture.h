@@ -30,8 +30,9 @@ int source_point_count(const OpticalSetup& setup, double z);
 
 /// Flux per pixel under an extended source and all colours of a spectrum: the weighted sum of the
 /// pictures under about `count` of its points. The number of points is the only approximation.
-std::vector<double> picture_under(const OpticalSetup& setup, int count,
-                                  const PointPicture& picture);
+/// @param control  takes a report of every point's picture.
+std::vector<double> picture_under(const OpticalSetup& setup, int count, const PointPicture& picture,
+                                  const RunControl& control = {});
 
 /// The same picture by a convolution with source_kernel().
 /// @param z  of the surface, mm.
@@ -51,7 +52,8 @@ Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, 
                                 const PointPicture& picture, const Executor& executor);
 
 /// @pre the lens's source has an extent.
-SourceCheck check_source(const Lens& lens, const Executor& executor);
+SourceCheck check_source(const Lens& lens, const Executor& executor,
+                         const RunControl& control = {});
 
 /// The best picture that any surface can project under an extended source, assuming that light is
 /// even within each part of a pixel (SourceKernel) and that one kernel holds for the whole lens.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/schedule/checkpoint.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
@@ -210,19 +211,35 @@ GuidedOptimization::Observer DesignLog::observer(const char* stage) {
     state_.convergence.push_back(row);
     char detail[64];
     std::snprintf(detail, sizeof(detail), "MAE %.4f", e.mae);
+    iterated_ = true;
     report(detail, iteration);
     return !task_.control.stop_requested();
   };
 }
 
+namespace {
+
+std::string stage_name(const DesignTask& task, const Checkpoint& state) {
+  return "design, level " + std::to_string(state.level + 1) + " of " +
+         std::to_string(task.levels.size());
+}
+
+/// "fitting heights, 43 %", or with the step's own detail in place of the share.
+std::string step_words(const std::string& what, const Progress& progress) {
+  if (!progress.detail.empty()) return what + ", " + progress.detail;
+  if (!(progress.total > 0.0)) return what;
+  const double share = std::clamp(progress.done / progress.total, 0.0, 1.0);
+  return what + ", " + std::to_string(static_cast<int>(100.0 * share)) + " %";
+}
+
+}  // namespace
+
 void DesignLog::report(const std::string& detail, int iteration) const {
-  const std::string stage = "design, level " + std::to_string(state_.level + 1) + " of " +
-                            std::to_string(task_.levels.size());
   const auto level = static_cast<std::size_t>(state_.level);
   const Level& at = task_.levels[level];
   const double rounds = state_.round + static_cast<double>(iteration) / at.iterations;
   const double done = work_before(task_, level) + level_work(task_, level) * rounds / at.rounds;
-  task_.control.report({stage, done, work_total(task_), detail});
+  task_.control.report({stage_name(task_, state_), done, work_total(task_), detail});
 }
 
 void DesignLog::ended_early(const std::string& step, const std::string& why) {
@@ -230,8 +247,28 @@ void DesignLog::ended_early(const std::string& step, const std::string& why) {
       "; " + step + " of round " + std::to_string(state_.round + 1) + " ended early (" + why + ")";
 }
 
-void DesignLog::report_rendering() const {
-  task_.control.report({"design", work_total(task_), work_total(task_), "rendering the lens"});
+void DesignLog::report_step(const std::string& what) const {
+  if (task_.options.resume && !iterated_) {
+    task_.control.report({stage_name(task_, state_), 0.0, 0.0, what});
+  } else {
+    report(what, 0);
+  }
+}
+
+RunControl DesignLog::step(const std::string& what) const {
+  report_step(what);
+  return {task_.control.stop_token(),
+          [this, what](const Progress& progress) { report_step(step_words(what, progress)); }};
+}
+
+void DesignLog::report_rendering(const std::string& what) const {
+  task_.control.report({"design", work_total(task_), work_total(task_), what});
+}
+
+RunControl DesignLog::rendering(const std::string& what) const {
+  report_rendering(what);
+  return {task_.control.stop_token(),
+          [this, what](const Progress& progress) { report_rendering(step_words(what, progress)); }};
 }
 
 void DesignLog::report_done() const {

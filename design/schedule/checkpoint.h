@@ -63,7 +63,14 @@ class DesignLog {
 
   /// Reports progress within a level. @param iteration  of the round.
   void report(const std::string& detail, int iteration) const;
-  void report_rendering() const;  ///< The levels are done.
+  /// Reports a step between iterations, such as "fitting heights". A resumed design has no share of
+  /// work before its first iteration, because its input can still be refused.
+  void report_step(const std::string& what) const;
+  /// Reports the step and returns a control that passes its progress on: "fitting heights, 43 %".
+  [[nodiscard]] RunControl step(const std::string& what) const;
+  /// The same once the levels are done: "rendering the lens" and so on.
+  void report_rendering(const std::string& what) const;
+  [[nodiscard]] RunControl rendering(const std::string& what) const;
   void report_done() const;
 
   /// Records that a step of this round ended early, as a remark to the user.
@@ -78,6 +85,7 @@ class DesignLog {
   Checkpoint& state_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double spent_before_;
+  bool iterated_ = false;  ///< An iteration of this run was reported.
   std::string remark_;
 };
 

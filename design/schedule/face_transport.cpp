@@ -120,7 +120,8 @@ Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map,
 }
 
 void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
-               const Executor& executor, SurfaceMesh& mesh, const HeightFitOptions& fit) {
+               const Executor& executor, SurfaceMesh& mesh, const HeightFitOptions& fit,
+               const RunControl& control) {
   const LightPath light(setup);
   Eigen::Matrix2Xd gradients(2, mesh.triangles.cols());
   parallel_for(executor, "aim faces", mesh.triangles.cols(), [&](std::int64_t f) {
@@ -129,7 +130,7 @@ void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
         (mesh.vertices.col(t[0]) + mesh.vertices.col(t[1]) + mesh.vertices.col(t[2])) / 3.0;
     gradients.col(f) = light.gradient_for(c, correspondence.centroids.col(f));
   });
-  fit_face_gradients(gradients, fit, executor, mesh);
+  fit_face_gradients(gradients, fit, executor, mesh, control);
 }
 
 namespace {
@@ -198,10 +199,13 @@ double rounded_up(double value) {
 }  // namespace
 
 void aim_surface(const Correspondence& wanted, const OpticalSetup& setup, double thickness,
-                 const Executor& executor, SurfaceMesh& mesh) {
+                 const Executor& executor, SurfaceMesh& mesh, const RunControl& control) {
   // The wanted slopes depend on the heights, and lifting the surface scales the picture.
   for (int pass = 0; pass < kAimPasses; ++pass) {
-    aim_faces(wanted, setup, executor, mesh, {.tolerance = kAimTolerance});
+    const RunControl one(control.stop_token(), [&](const Progress& p) {
+      control.report({p.stage, pass + p.done, double{1} * kAimPasses, p.detail});
+    });
+    aim_faces(wanted, setup, executor, mesh, {.tolerance = kAimTolerance}, one);
     mesh.vertices.row(2).array() += thickness - mesh.vertices.row(2).minCoeff();
   }
 }

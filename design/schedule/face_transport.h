@@ -73,7 +73,8 @@ Eigen::Matrix2Xd map_faces(const FaceLight& light, const BrenierMap& map, const 
 /// light path gives the gradient that each face needs, fit_face_gradients() fits the heights with
 /// the options `fit`. It moves light over any distance in one step, which descent on Eq. 20 cannot.
 void aim_faces(const Correspondence& correspondence, const OpticalSetup& setup,
-               const Executor& executor, SurfaceMesh& mesh, const HeightFitOptions& fit = {});
+               const Executor& executor, SurfaceMesh& mesh, const HeightFitOptions& fit = {},
+               const RunControl& control = {});
 
 /// Sets the heights of the surface that a design starts from: flat, or behind a curved front the
 /// surface that makes its light parallel (LightPath::land_from_start()). Its minimum z is
@@ -88,7 +89,7 @@ SurfaceMesh start_surface(const OpticalSetup& setup, GridShape grid, double thic
 /// Sets the heights that send the light nearest to `wanted` (aim_faces()); the thinnest place is
 /// `thickness` mm above the entry face.
 void aim_surface(const Correspondence& wanted, const OpticalSetup& setup, double thickness,
-                 const Executor& executor, SurfaceMesh& mesh);
+                 const Executor& executor, SurfaceMesh& mesh, const RunControl& control = {});
 
 /// A surface asked for: the light of a mesh's faces and where it has to land.
 struct Demand {

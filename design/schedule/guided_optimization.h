@@ -88,9 +88,10 @@ class GuidedOptimization {
   /// Improves `mesh` by at most `options.max_iterations` steps. Unknown scales are measured on the
   /// mesh first. The result depends on mesh and scales alone, so a resumed run takes the same
   /// steps.
+  /// @param control  takes reports until the first iteration.
   /// @throw Interrupted if the executor is stopped; `mesh` then holds the best surface so far.
   LbfgsSummary run(const LbfgsOptions& options, const Observer& observe, StepScales& scales,
-                   SurfaceMesh& mesh);
+                   SurfaceMesh& mesh, const RunControl& control = {});
   LbfgsSummary run(const LbfgsOptions& options, const Observer& observe, SurfaceMesh& mesh) {
     StepScales scales;
     return run(options, observe, scales, mesh);
@@ -101,12 +102,15 @@ class GuidedOptimization {
   [[nodiscard]] double value(const SurfaceMesh& mesh);
 
  private:
-  [[nodiscard]] StepScales measure_scales(const SurfaceMesh& mesh);
-  void calibrate(const Eigen::Matrix3Xd& vertices);
+  /// Reports the pictures from which curvatures are measured.
+  class Probes;
+
+  [[nodiscard]] StepScales measure_scales(const SurfaceMesh& mesh, const RunControl& control);
+  void calibrate(const Eigen::Matrix3Xd& vertices, Probes& probes);
   void begin_preconditioner(const SurfaceMesh& mesh, Eigen::Matrix3Xd& reach);
-  void level_shifts(const Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd& reach);
+  void level_shifts(const Eigen::Matrix3Xd& vertices, Probes& probes, Eigen::Matrix3Xd& reach);
   [[nodiscard]] Eigen::VectorXd squared_curvatures(const Eigen::Matrix3Xd& vertices, bool heights,
-                                                   std::uint64_t number);
+                                                   std::uint64_t number, Probes& probes);
   [[nodiscard]] Eigen::Matrix3Xd probe(bool heights, std::uint64_t number);
 
   OpticalSetup setup_;

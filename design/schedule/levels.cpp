@@ -345,15 +345,17 @@ constexpr double kMinStartShare = 0.02;
 constexpr int kDrawingSteps = 10;
 
 /// The spline fitted to a mesh, as a mesh of its control points.
-SurfaceMesh spline_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
+SurfaceMesh spline_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh,
+                         const RunControl& control) {
   constexpr double kShareStep = 0.125;
   const auto fitted = [&](const SurfaceMesh& surface, double share) {
-    return net_mesh(spline_through(surface, task.setup.lens_size, level.grid, share, task.executor,
-                                   task.control));
+    return net_mesh(
+        spline_through(surface, task.setup.lens_size, level.grid, share, task.executor, control));
   };
   const LevelProblem problem = make_problem(task, level, 0);
   for (double share = level.knot_share;; share -= kShareStep) {
     SurfaceMesh net = fitted(mesh, share);
+    control.report({"spline", 0.0, 0.0, "checking"});
     GuidedOptimization stage(net, problem.setup, problem.target, problem.objective, task.executor);
     if (std::isfinite(stage.value(net))) return net;
     if (share > 0.0) continue;
@@ -366,9 +368,10 @@ SurfaceMesh spline_start(const DesignTask& task, const Level& level, const Surfa
 
 }  // namespace
 
-SurfaceMesh level_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh) {
+SurfaceMesh level_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh,
+                        const RunControl& control) {
   if (mesh.grid == level.grid) return mesh;
-  if (level.spline) return spline_start(task, level, mesh);
+  if (level.spline) return spline_start(task, level, mesh, control);
   SurfaceMesh fine = regrid(mesh, task.setup.lens_size, level.grid);
   const auto triangles = static_cast<double>(fine.triangle_count());
   even_out(kMinStartShare * task.setup.lens_size.prod() / triangles, fine);

@@ -118,8 +118,9 @@ ControlNet settled(ControlNet net, double thickness);
 
 /// Returns a level's first surface: the previous one on the level's grid. A mesh has no folded and
 /// no tiny triangles (even_out()). A spline's knot lines follow the vertices as far as no barrier
-/// refuses it. @throw Interrupted
-SurfaceMesh level_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh);
+/// refuses it. @param control  takes reports of the spline's fit. @throw Interrupted
+SurfaceMesh level_start(const DesignTask& task, const Level& level, const SurfaceMesh& mesh,
+                        const RunControl& control);
 
 /// Moves the first `coordinates` of x, y and z towards another surface on the same grid, in steps,
 /// until no barrier refuses the mesh. @return false if one still does.

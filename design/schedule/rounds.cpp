@@ -124,7 +124,7 @@ void spread(const StepSite& site, const SurfaceMesh& even_mesh, const Matching& 
             : even.result.areas;
   const ServedAreas served{even_mesh, areas};
   if (!spread_vertices(served, task.options.spread, site.problem.setup, task.executor,
-                       RunControl(task.control.stop_token(), {}), mesh)) {
+                       site.log.step("spreading the mesh"), mesh)) {
     throw Interrupted();
   }
 }
@@ -142,6 +142,7 @@ Matching fit_mesh(const StepSite& site, MeshShaping shaping, const SurfaceMesh& 
   } else {
     mesh.vertices.row(2).setConstant(task.options.thickness);
   }
+  site.log.report_step("aligning the mesh with creases");
   const BrenierMap map(even.light.sites, even.result, site.problem.aim);
   align_to_creases(map, site.problem.setup, mesh);
   shape_start(task.setup, task.options.thickness, task.executor, mesh);
@@ -179,7 +180,8 @@ std::optional<AimedMesh> transport_step(const DesignTask& task, const LevelProbl
   AimedMesh aimed{mesh, {}};
   if (shapes) matching = fit_mesh(site, shaping, even, matching, aimed.mesh);
   aimed.wanted = {std::move(matching.result.centroids), std::move(matching.light.flux)};
-  aim_surface(aimed.wanted, problem.setup, task.options.thickness, task.executor, aimed.mesh);
+  aim_surface(aimed.wanted, problem.setup, task.options.thickness, task.executor, aimed.mesh,
+              log.step("fitting heights"));
   if (task.options.update_iterations > 0) follow_correspondence(site, aimed.wanted, aimed.mesh);
   return aimed;
 }
@@ -265,7 +267,8 @@ bool follow_picture(const LevelSite& site, const GuidedOptimization::Observer& o
   LbfgsOptions optimizer;
   optimizer.max_iterations = site.level.iterations;
   optimizer.history = kHistory;
-  const LbfgsSummary summary = site.stage.run(optimizer, observe, state.scales, state.mesh);
+  const LbfgsSummary summary = site.stage.run(optimizer, observe, state.scales, state.mesh,
+                                              site.log.step("starting iterations"));
   using Status = LbfgsSummary::Status;
   if (summary.status == Status::kInfeasibleStart) refuse_start(site.task);
   return summary.status != Status::kStopped;
@@ -375,11 +378,13 @@ bool needs_correction(const LevelProblem& problem, const Level& level, const Che
 constexpr int kCorrectionSamples = 6;
 
 /// Returns the picture to aim at so that the surface makes `target`.
-Image corrected_target(const DesignTask& task, const LevelProblem& problem, const Level& level,
-                       const SurfaceMesh& mesh, const Image& target) {
+Image corrected_target(const DesignTask& task, const DesignLog& log, const LevelProblem& problem,
+                       const Level& level, const SurfaceMesh& mesh, const Image& target) {
   const ControlNet net{mesh.grid, mesh.vertices};
+  int views = 0;
   const auto picture = [&](int samples) {
     return [&, samples](const OpticalSetup& light) {
+      log.report_step("correcting the picture, view " + std::to_string(++views));
       if (level.spline) return render_spline(net, samples, light, task.executor);
       return flux_of_surface(mesh, light, problem.objective.model, task.executor);
     };
@@ -396,19 +401,26 @@ Image corrected_target(const DesignTask& task, const LevelProblem& problem, cons
 /// @return false if it was asked to stop.
 bool run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
   const Level& level = task.levels[static_cast<std::size_t>(state.level)];
-  state.mesh = level_start(task, level, state.mesh);
+  if (state.mesh.grid != level.grid) {
+    state.mesh = level_start(task, level, state.mesh,
+                             log.step(level.spline ? "fitting a spline" : "refining the mesh"));
+  }
   LevelProblem problem = make_problem(task, level, state.mesh.triangle_count());
   const Image target = problem.target;
   std::unique_ptr<GuidedOptimization> stage;
   while (state.round < level.rounds) {
     const bool corrects = needs_correction(problem, level, state);
-    if (corrects) problem.target = corrected_target(task, problem, level, state.mesh, target);
+    if (corrects) problem.target = corrected_target(task, log, problem, level, state.mesh, target);
     if (corrects || !stage) {
+      log.report_step("preparing iterations");
       stage.reset();  // There is not always room for two.
       stage = std::make_unique<GuidedOptimization>(state.mesh, problem.setup, problem.target,
                                                    problem.objective, task.executor);
     }
-    if (corrects) state.value = stage->value(state.mesh);
+    if (corrects) {
+      log.report_step("evaluating the surface");
+      state.value = stage->value(state.mesh);
+    }
     if (!run_round({task, level, problem, *stage, log}, state)) return false;
     if (state.round < level.rounds) save(task, log, state);
   }

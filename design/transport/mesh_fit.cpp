@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -117,8 +118,8 @@ MongeAmpereResult solve_monge_ampere(const Image& picture, const MongeAmpereOpti
     change = iteration.step();
     ++done;
     converged = change <= options.tolerance;
-    control.report(
-        {"transport", static_cast<double>(done), static_cast<double>(options.max_iterations), ""});
+    control.report({"transport", static_cast<double>(done),
+                    static_cast<double>(options.max_iterations), "step " + std::to_string(done)});
   }
   MongeAmpereResult result = iteration.result();
   result.converged = converged;
@@ -336,11 +337,18 @@ class EvenGridPoisson {
   Eigen::VectorXd cells_;  ///< Share of a cell that a node stands for.
 };
 
+/// Share of the way from a residual of 1 to the tolerance, on a logarithmic scale, 0 … 1.
+double share_of_fit(double residual, double tolerance) {
+  if (residual <= tolerance) return 1.0;
+  const double share = std::log(residual) / std::log(tolerance);
+  return share > 0.0 ? std::min(share, 1.0) : 0.0;
+}
+
 }  // namespace
 
 HeightFitSummary fit_face_gradients(const Eigen::Matrix2Xd& gradients,
                                     const HeightFitOptions& options, const Executor& executor,
-                                    SurfaceMesh& mesh) {
+                                    SurfaceMesh& mesh, const RunControl& control) {
   const System system = assemble(mesh, gradients);
   const Eigen::Index n = system.right.size();
   EvenGridPoisson preconditioner(mesh.grid);
@@ -362,6 +370,7 @@ HeightFitSummary fit_face_gradients(const Eigen::Matrix2Xd& gradients,
   const auto measure = [&] {
     summary.residual = scale > 0.0 ? r.norm() / scale : 0.0;
     summary.converged = summary.residual <= options.tolerance;
+    control.report({"heights", share_of_fit(summary.residual, options.tolerance), 1.0, ""});
   };
   measure();
   while (!summary.converged && summary.iterations < options.max_iterations) {

@@ -88,9 +88,10 @@ struct HeightFitSummary {
 /// @param gradients  2 × F, without unit.
 /// @param mesh  a grid mesh of positive projected areas; its mean height is kept, and its heights
 ///              are the start of the iteration.
+/// @param control  takes reports; their share is that of the residual's logarithm.
 /// @throw Interrupted if the executor is stopped; the mesh is then unchanged.
 HeightFitSummary fit_face_gradients(const Eigen::Matrix2Xd& gradients,
                                     const HeightFitOptions& options, const Executor& executor,
-                                    SurfaceMesh& mesh);
+                                    SurfaceMesh& mesh, const RunControl& control = {});
 
 }  // namespace lensforge

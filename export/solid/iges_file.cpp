@@ -250,8 +250,9 @@ void fill_header(const StepHeader& header, const fs::path& path, IGESControl_Wri
 
 /// Body of the child process.
 SolidContent write_beside(const SplineNet& net, const StepHeader& header, const fs::path& beside,
-                          const fs::path& path) {
+                          const fs::path& path, const RunControl& control) {
   silence_opencascade();
+  solid_step("making the solid", control);
   IGESControl_Controller::Init();
   constexpr int kSolids = 1;
   IGESControl_Writer writer("MM", kSolids);
@@ -260,9 +261,12 @@ SolidContent write_beside(const SplineNet& net, const StepHeader& header, const 
   }
   writer.ComputeModel();
   fill_header(header, path, writer);
+  solid_step("writing lines", control);
   errno = 0;
   if (!writer.Write(beside.c_str())) fail_to_write(path, last_system_error());
-  return inspect_shape(read_iges_shape(beside, {}), net.volume());
+  const TopoDS_Shape shape = read_iges_shape(beside, solid_step("reading back", control));
+  solid_step("checking", control);
+  return inspect_shape(shape, net.volume());
 }
 
 }  // namespace
@@ -271,8 +275,9 @@ SolidContent solids_module::write_iges(const SplineNet& net, const StepHeader& h
                                        const fs::path& path, const RunControl& control) {
   SolidContent content;
   write_whole_file(path, [&](const fs::path& beside) {
-    content = write_guarded(
-        path, control, [&](const RunControl&) { return write_beside(net, header, beside, path); });
+    content = write_guarded(path, control, [&](const RunControl& inner) {
+      return write_beside(net, header, beside, path, inner);
+    });
     require_read_back(content, net.volume(), path);
   });
   return content;

@@ -203,6 +203,13 @@ std::string bytes_of(const SolidContent& content) {
 
 SolidContent content_of(const std::string& bytes) { return ByteReader(bytes).get<SolidContent>(); }
 
+RunControl solid_step(const std::string& what, const RunControl& control) {
+  control.report({"", 0.0, 0.0, what});
+  return {control.stop_token(), [&control, what](const Progress& progress) {
+            control.report({progress.stage, progress.done, progress.total, what});
+          }};
+}
+
 SolidContent write_guarded(const std::filesystem::path& path, const RunControl& control,
                            const std::function<SolidContent(const RunControl&)>& write) {
   const auto guarded = [&](const RunControl& inner) {

@@ -34,6 +34,10 @@ std::string read_guarded(const std::filesystem::path& path,
                          const std::function<std::string(const RunControl&)>& work,
                          const RunControl& control);
 
+/// Reports a step of writing a solid, such as "reading back", and returns a control whose reports
+/// have it as detail. `control` must outlive it.
+RunControl solid_step(const std::string& what, const RunControl& control);
+
 /// Reads a STEP file and turns it into shapes; lengths become millimetres.
 /// @pre in a child process, or the file is our own.
 /// @throw InputError if OpenCASCADE does not accept it as a STEP file.

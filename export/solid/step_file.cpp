@@ -242,19 +242,24 @@ void fill_header(const StepHeader& header, STEPControl_Writer& writer) {
 
 /// Body of the child process.
 SolidContent write_beside(const SplineNet& net, const StepHeader& header, StepSchema schema,
-                          const fs::path& beside, const fs::path& path) {
+                          const fs::path& beside, const fs::path& path, const RunControl& control) {
   silence_opencascade();
+  solid_step("making the solid", control);
   const NamedSolid solid = make_spline_solid(net);
   set_up_writing(header, schema, net.outline.has_value());
   STEPControl_Writer writer;
+  solid_step("converting", control);
   if (writer.Transfer(solid.solid, STEPControl_ManifoldSolidBrep) != IFSelect_RetDone) {
     fail_to_write(path, "OpenCASCADE cannot put the solid into STEP");
   }
   name_faces(solid, writer);
   fill_header(header, writer);
+  solid_step("writing lines", control);
   errno = 0;
   if (writer.Write(beside.c_str()) != IFSelect_RetDone) fail_to_write(path, last_system_error());
-  return inspect_shape(read_step_shape(beside, {}), net.volume());
+  const TopoDS_Shape shape = read_step_shape(beside, solid_step("reading back", control));
+  solid_step("checking", control);
+  return inspect_shape(shape, net.volume());
 }
 
 }  // namespace
@@ -264,8 +269,8 @@ SolidContent solids_module::write_step(const SplineNet& net, const StepHeader& h
                                        const RunControl& control) {
   SolidContent content;
   write_whole_file(path, [&](const fs::path& beside) {
-    content = write_guarded(path, control, [&](const RunControl&) {
-      return write_beside(net, header, schema, beside, path);
+    content = write_guarded(path, control, [&](const RunControl& inner) {
+      return write_beside(net, header, schema, beside, path, inner);
     });
     require_read_back(content, net.volume(), path);
   });

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/cam_command.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "core/error.h"
@@ -54,6 +55,23 @@ TEST(CommandFrame, PrintsNotesWarningsTheResultAndWhatFollowsIt) {
   EXPECT_EQ(text.err, "lensforge: held\nlensforge: warning: hot\nlensforge: later\n");
   const Ending json = run_with(with_everything, {"--json"});
   EXPECT_EQ(nlohmann::json::parse(json.out), nlohmann::json({{"command", "try"}, {"size", 3}}));
+}
+
+std::string next_step_with(const std::string& post, int missed) {
+  JobResult job;
+  job.files = {"my lens/cam/rough.ngc", "my lens/cam/finish.ngc"};
+  CamOptions cam;
+  cam.post = find_post(post, "--post");
+  return next_step("my lens/cam/report.html", job, cam, missed);
+}
+
+TEST(NextStep, ChecksTheFirstProgramWhereSendTakesIt) {
+  const std::string page = "look at my lens/cam/report.html";
+  const std::string send = "; then: lensforge send 'my lens/cam/rough.ngc' --dry-run";
+  EXPECT_EQ(next_step_with("grbl", 0), page + send);
+  EXPECT_EQ(next_step_with("grblhal", 0), page + send + " --dialect grblhal");
+  EXPECT_EQ(next_step_with("linuxcnc", 0), page);
+  EXPECT_EQ(next_step_with("grbl", 1), page) << "a limit was missed";
 }
 
 TEST(CommandFrame, WithoutAResultPrintsNotesAlone) {

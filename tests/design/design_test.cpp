@@ -260,6 +260,36 @@ TEST(DesignLens, ProgressRunsFromZeroToItsTotal) {
   expect_reports_reach_their_total(picture(), two_level_options());
 }
 
+TEST(DesignLens, StepsBetweenIterationsReportProgress) {
+  std::vector<std::string> details;
+  const RunControl control({}, [&](const Progress& p) { details.push_back(p.detail); });
+  DesignOptions options = two_level_options();
+  options.model = SurfaceModel::kSpline;
+  ASSERT_EQ(design_lens(picture(), options, Executor::serial(), control).status, Status::kDone);
+  for (const char* step :
+       {"spreading the mesh, step 2", "aligning the mesh with creases", "fitting heights, ",
+        "starting iterations, curvature 2", "starting iterations, first step", "refining the mesh",
+        "fitting a spline, ", "correcting the picture, view 2", "rendering the lens as spline"}) {
+    EXPECT_THAT(details, ::testing::Contains(::testing::StartsWith(step)));
+  }
+}
+
+TEST(DesignLens, ResumedItHasNoShareOfWorkBeforeItsFirstIteration) {
+  const TempFolder folder;
+  DesignOptions options = two_level_options();
+  options.checkpoint = folder / "checkpoint";
+  ASSERT_EQ(design_stopped_at(4, options).status, Status::kInterrupted);
+  options.resume = true;
+  std::vector<Progress> reports;
+  const RunControl control({}, [&](const Progress& p) { reports.push_back(p); });
+  design_lens(picture(), options, Executor::serial(), control);
+  const auto first = std::ranges::find_if(
+      reports, [](const Progress& p) { return p.detail == "preparing iterations"; });
+  ASSERT_NE(first, reports.end());
+  EXPECT_EQ(first->done, 0.0);
+  EXPECT_GT(reports.back().done, 0.0);
+}
+
 TEST(DesignLens, ProgressReachesItsTotalThoughRoundsHaveNothingToDo) {
   DesignOptions options = small_options();
   options.weights = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};

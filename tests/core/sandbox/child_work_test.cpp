@@ -109,6 +109,24 @@ TEST(ChildWork, ProgressOfTheWorkReachesTheCaller) {
   EXPECT_GE(most, 0.5);
 }
 
+TEST(ChildWork, EveryNewDetailOfTheWorkReachesTheCaller) {
+  std::vector<std::string> details;
+  const RunControl control({}, [&](const Progress& p) {
+    if (details.empty() || details.back() != p.detail) details.push_back(p.detail);
+  });
+  const auto work = [](const RunControl& inner) {
+    inner.report({"", 0.0, 0.0, "converting"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    inner.report({"", 1.0, 1.0, "converting"});
+    inner.report({"", 0.0, 0.0, "checking"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    return std::string();
+  };
+  run_in_child("work", {}, work, control);
+  if (!details.empty() && details.front().empty()) details.erase(details.begin());
+  EXPECT_THAT(details, ::testing::ElementsAre("converting", "checking"));
+}
+
 TEST(ChildWork, OwnThreadsDoEveryItemOnceAndPassErrorsOn) {
   std::vector<int> done(1000, 0);
   for_each_in_threads(4, 1000, [&](std::int64_t i) { ++done[static_cast<std::size_t>(i)]; });

@@ -339,7 +339,7 @@ TEST(LevelStart, HasNoFoldedAndNoTinyTriangleForAnyPicture) {
 
     const SurfaceMesh plain = regrid(state.mesh, task.setup.lens_size, fine.grid);
     if (least_area(plain) <= 0.0) ++folded;
-    const SurfaceMesh start = level_start(task, fine, state.mesh);
+    const SurfaceMesh start = level_start(task, fine, state.mesh, control);
     EXPECT_EQ(start.grid, fine.grid);
     const double mean = task.setup.lens_size.prod() / static_cast<double>(start.triangle_count());
     EXPECT_GT(least_area(start), 10.0 * kMinArea * mean);
@@ -357,7 +357,7 @@ TEST(LevelStart, ASplineOfASurfaceThatReflectsTotallyIsDrawnBackUntilItDoesNot) 
   ASSERT_TRUE(level.spline);
   const SurfaceMesh steep = testing::height_field(task.setup.lens_size, task.levels.front().grid,
                                                   [](double x, double) { return 2.0 * x; });
-  const SurfaceMesh start = level_start(task, level, steep);
+  const SurfaceMesh start = level_start(task, level, steep, control);
   EXPECT_EQ(start.grid, level.grid);
   EXPECT_TRUE(is_allowed(task, level, start));
   EXPECT_GT(start.vertices.row(2).maxCoeff() - start.vertices.row(2).minCoeff(), 1.0)
