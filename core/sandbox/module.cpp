@@ -3,10 +3,12 @@
 
 #include <dlfcn.h>
 
+#include <string>
 #include <string_view>
 
 #include "core/error.h"
 #include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -39,12 +41,12 @@ void require_same_build(const ModuleHead& head, std::size_t bytes) {
 
 const char* module_mark() { return "lensforge " LENSFORGE_VERSION " by compiler " __VERSION__; }
 
-const ModuleHead& load_module(const std::string& name, std::size_t bytes) {
-  const std::string file = "lensforge-" + name + ".so";
+const ModuleHead& load_module(const char* name, std::size_t bytes) {
+  const std::string file = joined({"lensforge-", name, ".so"});
   // Hidden from other libraries, and each function is bound on its first call.
   void* const module = ::dlopen(file.c_str(), RTLD_LAZY | RTLD_LOCAL);
   if (module == nullptr) fail_to_load(file, ::dlerror());
-  void* const function = ::dlsym(module, ("lensforge_" + name).c_str());
+  void* const function = ::dlsym(module, joined({"lensforge_", name}).c_str());
   if (function == nullptr) fail_to_load(file, ::dlerror());
   const ModuleHead& head = *reinterpret_cast<const ModuleHead* (*)()>(function)();
   require_same_build(head, bytes);

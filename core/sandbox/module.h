@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
 #include <type_traits>
 
 /// A module is a shared library of this program with the code that needs large libraries. It is
@@ -25,11 +24,11 @@ const char* module_mark();
 /// names.
 /// @param bytes  size of the table that the caller expects.
 /// @throw RunError in one line if the file is missing, cannot be loaded or is of another build.
-const ModuleHead& load_module(const std::string& name, std::size_t bytes);
+const ModuleHead& load_module(const char* name, std::size_t bytes);
 
 /// The module's table. @throw RunError as above.
 template <class Table>
-const Table& load_module(const std::string& name) {
+const Table& load_module(const char* name) {
   static_assert(std::is_standard_layout_v<Table> &&
                 std::is_same_v<decltype(Table::head), ModuleHead>);
   static_assert(offsetof(Table, head) == 0);

@@ -28,7 +28,7 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 std::string refusal(const std::string& name) {
-  return message_of<RunError>([&] { load_module(name, sizeof(ModuleHead)); });
+  return message_of<RunError>([&] { load_module(name.c_str(), sizeof(ModuleHead)); });
 }
 
 TEST(Module, AMissingFileIsNamedInOneLine) {
