@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _lensforge
 
-_MOST = 2**31 - 1
+_MAX = 2**31 - 1
 
 
 def path_of(path):
@@ -25,7 +25,7 @@ def whole(name, value):
         number = operator.index(value)
     except TypeError:
         raise TypeError(f"{name}={value!r}: must be a whole number") from None
-    return max(-_MOST, min(_MOST, number))
+    return max(-_MAX, min(_MAX, number))
 
 
 def with_options(name):
