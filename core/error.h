@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace lensforge {
 
@@ -11,6 +12,18 @@ namespace lensforge {
 class InputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// A file or folder that is to be read does not exist.
+class MissingFile : public InputError {
+ public:
+  MissingFile(const std::string& message, std::string path)
+      : InputError(message), path_(std::move(path)) {}
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
 };
 
 /// Something outside the program failed while it ran (disk full, file vanished). Exit code 1.

@@ -55,7 +55,7 @@ const JobCommand* command_named(const std::string& name) {
 
 /// True for options that batch itself sets.
 bool is_for_batch(const std::string& option) {
-  static const std::set<std::string> reserved{"config", "force", "help",   "json",
+  static const std::set<std::string> reserved{"config", "force", "help",   "help-all", "json",
                                               "out",    "quiet", "resume", "version"};
   return reserved.contains(option);
 }

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/frame/common_output.h"
 #include "app/frame/console.h"
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
@@ -100,17 +101,6 @@ bool is_option(const FieldSpec& spec) { return spec.name.starts_with("--"); }
 /// A help's first clause.
 std::string short_help(const FieldSpec& spec) { return spec.help.substr(0, spec.help.find(';')); }
 
-/// Quotes a text in single quotes, valid in all three shells. @param escaped  characters that get a
-/// backslash.
-std::string quoted(const std::string& text, std::string_view escaped = {}) {
-  std::string all = "'";
-  for (const char c : text) {
-    if (escaped.find(c) != std::string_view::npos) all += '\\';
-    all += c == '\'' ? "'\\''" : std::string(1, c);
-  }
-  return all + "'";
-}
-
 std::string command_names(const std::vector<CompletedCommand>& commands) {
   std::vector<std::string> names;
   names.reserve(commands.size());
@@ -164,7 +154,7 @@ _lensforge() {
 std::string bash_script(const std::vector<CompletedCommand>& commands) {
   std::string text = kBashHead;
   text += "  if ((COMP_CWORD == 1)); then\n    _lensforge_words " +
-          quoted(command_names(commands) + " --help --version") + "\n    return\n  fi\n";
+          quoted(command_names(commands) + " --help --help-all --version") + "\n    return\n  fi\n";
   text += "  case \"${COMP_WORDS[1]} $prev\" in\n";
   std::string lists;
   for (const CompletedCommand& command : commands) {

@@ -53,15 +53,22 @@ nlohmann::json files_json(const std::vector<std::filesystem::path>& files) {
   return list;
 }
 
+std::string quoted(const std::string& text, std::string_view escaped) {
+  std::string all = "'";
+  for (const char c : text) {
+    if (escaped.find(c) != std::string_view::npos) all += '\\';
+    all += c == '\'' ? "'\\''" : std::string(1, c);
+  }
+  return all + "'";
+}
+
 std::string shell_word(const std::string& text) {
   const auto is_plain = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
            std::strchr("_-./+=,:@%", c) != nullptr;
   };
   if (!text.empty() && std::all_of(text.begin(), text.end(), is_plain)) return text;
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return word + "'";
+  return quoted(text);
 }
 
 std::string size_text(long columns, long rows) {

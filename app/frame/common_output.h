@@ -5,6 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/image/image.h"
@@ -32,6 +33,10 @@ std::string fringe_text(const Fringe& fringe);
 
 /// The paths of files, in order.
 nlohmann::json files_json(const std::vector<std::filesystem::path>& files);
+
+/// The text in single quotes, valid in bash, zsh and fish. @param escaped  characters that get a
+/// backslash.
+std::string quoted(const std::string& text, std::string_view escaped = {});
 
 /// The text as one word of a shell: in quotes where it needs them.
 std::string shell_word(const std::string& text);

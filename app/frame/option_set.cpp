@@ -384,9 +384,11 @@ std::vector<FieldSpec> OptionSet::listed() const {
   for (const BoundOption& option : parser_->options) specs.push_back(option.field);
   for (const auto& [name, kind] : {std::pair{"--config", FieldKind::kText},
                                    {"--help", FieldKind::kFlag},
+                                   {"--help-all", FieldKind::kFlag},
                                    {"--version", FieldKind::kFlag}}) {
-    const CLI::Option& option = *parser_->app.get_option(name);
-    specs.push_back({name, kind, option.get_description(), {}, option.get_type_name()});
+    const CLI::Option* option = parser_->app.get_option_no_throw(name);
+    if (option == nullptr) continue;  // A command without further options has no --help-all.
+    specs.push_back({name, kind, option->get_description(), {}, option->get_type_name()});
   }
   return specs;
 }

@@ -96,7 +96,8 @@ Keywords::Keywords(std::string function, const Description& fields,
   } catch (const app::ListedOptions& listed) {
     specs_ = listed.options;
   }
-  static const std::set<std::string> common{"--json", "--quiet", "--config", "--help", "--version"};
+  static const std::set<std::string> common{"--json", "--quiet",    "--config",
+                                            "--help", "--help-all", "--version"};
   std::erase_if(specs_, [&](const FieldSpec& spec) {
     return !spec.name.starts_with("--") || common.contains(spec.name) ||
            withheld.contains(spec.name);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
-#include <pybind11/stl/filesystem.h>
 
 #include <cerrno>
 #include <exception>
@@ -12,7 +11,6 @@
 #include "app/frame/command_line.h"
 #include "app/python/bindings.h"
 #include "core/error.h"
-#include "core/io/missing_file.h"
 #include "core/schema/option_text.h"
 #include "core/text/version.h"
 
@@ -53,12 +51,14 @@ void check_signals() {
 
 namespace {
 
-/// A message as a Python text, with keywords for options. Paths may hold any bytes.
-py::object text_of(const std::string& message) {
-  const std::string text = in_keywords(message);
+/// A Python text. Paths may hold any bytes.
+py::object decoded(const std::string& text) {
   return py::reinterpret_steal<py::object>(
       PyUnicode_DecodeFSDefaultAndSize(text.data(), static_cast<py::ssize_t>(text.size())));
 }
+
+/// A message with keywords for options.
+py::object text_of(const std::string& message) { return decoded(in_keywords(message)); }
 
 void raise(const char* type, const py::object& arguments) {
   const py::object kind = py::module_::import("lensforge._errors").attr(type);
@@ -66,12 +66,12 @@ void raise(const char* type, const py::object& arguments) {
 }
 
 /// The libraries' kinds of failure; a bug still ends the process with its values.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)  pybind11 sets the signature.
 void translate(std::exception_ptr error) {
   try {
     if (error) std::rethrow_exception(error);
   } catch (const MissingFile& e) {
-    raise("MissingFileError",
-          py::make_tuple(ENOENT, text_of(e.what()), py::str(py::cast(e.path()))));
+    raise("MissingFileError", py::make_tuple(ENOENT, text_of(e.what()), decoded(e.path())));
   } catch (const InputError& e) {
     raise("InputError", text_of(e.what()));
   } catch (const RunError& e) {
@@ -84,6 +84,7 @@ void translate(std::exception_ptr error) {
 /// The command itself, for a process that does nothing else. @return its exit code.
 int run_command_line(std::vector<std::string> words) {
   std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
   const py::gil_scoped_release released;

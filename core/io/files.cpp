@@ -18,7 +18,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/io/missing_file.h"
 
 namespace lensforge {
 namespace {
@@ -81,7 +80,7 @@ const char* kind_of(mode_t mode) {
 
 [[noreturn]] void fail_to_read(const fs::path& path, int error) {
   const std::string message = path.string() + ": cannot be read: " + system_reason(error);
-  if (error == ENOENT) throw MissingFile(message, path);
+  if (error == ENOENT) throw MissingFile(message, path.string());
   throw InputError(message);
 }
 

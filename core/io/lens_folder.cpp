@@ -20,7 +20,6 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/io/missing_file.h"
 
 namespace lensforge {
 namespace {
@@ -126,7 +125,7 @@ FolderLock::FolderLock(const fs::path& folder, Kind kind) {
   if (!folder_.open()) {
     const int error = errno;
     const std::string message = folder.string() + ": cannot be opened: " + system_reason(error);
-    if (error == ENOENT) throw MissingFile(message, folder);
+    if (error == ENOENT) throw MissingFile(message, folder.string());
     throw InputError(message);
   }
   if (!attempt(kind)) refuse_held(folder);

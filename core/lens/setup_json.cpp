@@ -275,8 +275,7 @@ OpticalSetup read_setup(const JsonFields& fields, const std::filesystem::path& f
   setup.image_size = fields.number_pair("image_size");
   setup.image_origin = fields.number_pair("image_origin");
   setup.pixels = fields.integer_pair("pixels");
-  setup.view =
-      word_in<ViewSide>(fields, "view", {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}});
+  setup.view = word_in(fields, "view", named_views());
   if (fields.has("screen")) read_screen(fields.object("screen"), setup);
   if (!setup.screen_is_turned()) setup.focal_length = fields.number("focal_length");
   return setup;

@@ -227,6 +227,10 @@ void validate(const OpticalSetup& setup) {
   require_spectrum(setup);
 }
 
+std::vector<std::pair<std::string, ViewSide>> named_views() {
+  return {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}};
+}
+
 std::vector<std::pair<std::string, Emission>> named_emissions() {
   return {{"isotropic", Emission::kIsotropic}, {"lambertian", Emission::kLambertian}};
 }
@@ -297,7 +301,7 @@ std::string width_words(const PointSource& /*lamp*/, double width) {
 
 std::string lamp_words(const OpticalSetup& setup) {
   const auto words = [&](const auto& lamp) {
-    const std::string text = words_of(lamp, setup);
+    std::string text = words_of(lamp, setup);
     if (setup.extent.none()) return text;
     const bool disc = setup.extent.shape.is_disc();
     return joined({text, disc ? ", a disc " : ", a shape of its own ",

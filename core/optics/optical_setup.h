@@ -90,6 +90,8 @@ struct SourceExtent {
 /// The viewer's side: the lens's side of an opaque wall, or behind a translucent screen.
 enum class ViewSide { kFront, kRear };
 
+std::vector<std::pair<std::string, ViewSide>> named_views();
+
 /// Intensity of a point source by direction: constant, or proportional to the cosine of the angle
 /// to the line from the source to the middle of the lens (a flat LED).
 enum class Emission { kIsotropic, kLambertian };

@@ -26,7 +26,7 @@ inline std::string joined(std::initializer_list<std::string_view> texts) {
 
 /// The text with a capital letter first.
 inline std::string capitalised(std::string text) {
-  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 32);
+  if (!text.empty()) text[0] = upper(text[0]);
   return text;
 }
 

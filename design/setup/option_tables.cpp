@@ -127,7 +127,7 @@ void describe(Description& d, DesignOptions& o) {
   d.word("--model", o.model, named_models(),
          "surface model: flat facets, smooth with a normal at every vertex, or one smooth spline "
          "from design to STEP; beyond 527 x 527 pixels smooth unless it is given");
-  d.word("--view", o.view, {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
+  d.word("--view", o.view, named_views(),
          "picture seen on a wall from the lens's side, or on a screen from behind");
   d.number("--smoothness", o.smoothness, Limits::between(0, kMaxWeight), "",
            "factor on --weight-smooth")
@@ -239,7 +239,7 @@ void describe(Description& d, RenderOptions& o) {
            "z of the wall; a lens has its own default");
   d.number("--ior", o.setup.ior, Limits::between(kMinIor, kMaxIor), "",
            "refractive index; a lens has its own default");
-  d.word("--view", o.setup.view, {{"front", ViewSide::kFront}, {"rear", ViewSide::kRear}},
+  d.word("--view", o.setup.view, named_views(),
          "side from which the picture is seen; a lens has its own default");
   describe_picture(d, o.setup);
   describe_colours(d, o.setup.spectrum);

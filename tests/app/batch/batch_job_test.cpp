@@ -75,6 +75,7 @@ TEST_F(BatchJobs, SayWhichLineIsWrongAndWhy) {
                  "option 'focals' of design: no such option");
   expect_refused(design + ",\"options\":{\"foc\":1}}", "no such option");
   expect_refused(design + ",\"options\":{\"out\":\"x\"}}", "is set by batch itself");
+  expect_refused(design + ",\"options\":{\"help-all\":true}}", "is set by batch itself");
   expect_refused(design + ",\"options\":{\"focal\":null}}",
                  "--focal null: must be a text or a number");
   expect_refused(design + ",\"options\":{\"focal\":[250,300]}}", "--grid makes a job of each");
