@@ -71,7 +71,7 @@ py::capsule owner_of(std::unique_ptr<Value> value) {
   return owner;
 }
 
-constexpr py::ssize_t kMostChannels = 4;
+constexpr py::ssize_t kMaxChannels = 4;
 
 /// Numbers of one type as light.
 template <class Number>
@@ -101,9 +101,7 @@ class Light {
 template <class Number>
 double grey(const Number* pixel, int channels, const Light<Number>& light) {
   if (channels < 3) return light.of(pixel[0]);
-  // Equal channels are used directly, as in files: the weighted sum rounds.
-  if (pixel[0] == pixel[1] && pixel[1] == pixel[2]) return light.of(pixel[0]);
-  return luminance_rec709({light.of(pixel[0]), light.of(pixel[1]), light.of(pixel[2])});
+  return grey_light({light.of(pixel[0]), light.of(pixel[1]), light.of(pixel[2])});
 }
 
 template <class Number>
@@ -115,16 +113,6 @@ void require_light(std::span<const Number> values, const std::string& name) {
     throw InputError(name + ": holds " + number_text(*bad) +
                      ": light must be finite and not negative");
   }
-}
-
-/// @throw InputError if nothing of a picture with transparent parts shows.
-void require_visible(const Image& image, const std::string& name, const Background& background) {
-  const auto behind = static_cast<float>(background.light());
-  const auto values = image.values();
-  if (std::any_of(values.begin(), values.end(), [&](float v) { return v != behind; })) return;
-  throw InputError(name + ": is " + (background == Background{} ? "black" : "of one brightness") +
-                   " all over, since transparency is flattened onto " + background.text() +
-                   ": use --background " + (background == Background{} ? "white" : "black"));
 }
 
 template <class Number>
@@ -150,7 +138,8 @@ Image image_of(const py::array& array, const std::string& name, const Background
     value = static_cast<float>(alpha * whole + (1.0 - alpha) * behind);
     pixel += channels;
   }
-  if (open) require_visible(image, name, background);
+  if (!open) return image;
+  if (const auto reason = hidden_by(image, background)) throw InputError(name + ": " + *reason);
   return image;
 }
 
@@ -161,7 +150,7 @@ Image image_from(const py::array& array, const std::string& name, const Backgrou
   const auto bytes = array.dtype().itemsize();
   const bool known = kind == 'f' || (kind == 'u' && bytes <= 2);
   const bool shaped = array.ndim() == 2 ||
-                      (array.ndim() == 3 && array.shape(2) >= 1 && array.shape(2) <= kMostChannels);
+                      (array.ndim() == 3 && array.shape(2) >= 1 && array.shape(2) <= kMaxChannels);
   if (!known || !shaped || array.size() == 0) {
     refuse(name, array,
            "must be (rows, columns), or those and 1 to 4 channels, of floats, linear light, 1 is "

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <istream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "core/image/svg_drawing.h"
 #include "core/image/transfer.h"
 #include "core/schema/description.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -60,7 +62,17 @@ std::string Background::text() const {
 double Background::light() const {
   std::array<double, 3> light{};
   std::transform(rgb.begin(), rgb.end(), light.begin(), [](int v) { return decode(v / 255.0); });
-  return light[0] == light[1] && light[1] == light[2] ? light[0] : luminance_rec709(light);
+  return grey_light(light);
+}
+
+std::optional<std::string> hidden_by(const Image& image, const Background& background) {
+  const auto behind = static_cast<float>(background.light());
+  const auto values = image.values();
+  if (std::ranges::any_of(values, [&](float value) { return value != behind; })) return {};
+  const bool on_black = background == Background{};
+  return joined({"is ", on_black ? "black" : "of one brightness",
+                 " all over, since transparency is flattened onto ", background.text(),
+                 ": use --background ", on_black ? "white" : "black"});
 }
 
 void describe(Description& d, Background& background) {

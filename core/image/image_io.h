@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,10 @@ struct Background {
 
   friend bool operator==(const Background&, const Background&) = default;
 };
+
+/// Why nothing shows of a picture with transparent parts in front of its background; none if
+/// something does. Follows the picture's name in a message.
+std::optional<std::string> hidden_by(const Image& image, const Background& background);
 
 /// The option for all commands that read pictures.
 void describe(Description& d, Background& background);

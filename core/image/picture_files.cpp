@@ -225,10 +225,8 @@ double PictureLight::light_of(const std::array<double, 3>& stored, double alpha)
   }
   const std::array<double, 3> light{decoded(stored[0]) * alpha, decoded(stored[1]) * alpha,
                                     decoded(stored[2]) * alpha};
-  // Equal channels are used directly: the weighted sum rounds.
-  if (light[0] == light[1] && light[1] == light[2]) return light[0];
-  saw_colour_ = true;
-  return luminance_rec709(light);
+  if (light[0] != light[1] || light[1] != light[2]) saw_colour_ = true;
+  return grey_light(light);
 }
 
 std::array<double, 3> PictureLight::stored_of(const float* pixel, int column, int row) {
@@ -311,17 +309,9 @@ void report_cover(const fs::path& path, const Cover& cover, const Background& ba
                   LoadedImage& loaded, const std::string& why = {}) {
   if (!cover.open) return;
   if (!cover.drawn) refuse_picture(path, "is transparent all over: it shows nothing" + why);
-  const auto values = loaded.image.values();
-  const auto behind = static_cast<float>(background.light());
-  const bool on_black = background == Background{};
-  if (std::ranges::all_of(values, [&](float value) { return value == behind; })) {
-    refuse_picture(path, std::string("is ") + (on_black ? "black" : "of one brightness") +
-                             " all over, since transparency is flattened onto " +
-                             background.text() + ": use --background " +
-                             (on_black ? "white" : "black") + why);
-  }
+  if (const auto reason = hidden_by(loaded.image, background)) refuse_picture(path, *reason + why);
   loaded.changes.push_back("transparency flattened onto " + background.text());
-  if (on_black && !cover.bright) {
+  if (background == Background{} && !cover.bright) {
     loaded.changes.back() += ", and what is drawn is dark: --background white shows it on white";
   }
 }

@@ -36,4 +36,9 @@ inline double luminance_rec709(const std::array<double, 3>& light) {
   return 0.2126 * light[0] + 0.7152 * light[1] + 0.0722 * light[2];
 }
 
+/// The same, exact for grey: the weighted sum of equal channels rounds.
+inline double grey_light(const std::array<double, 3>& light) {
+  return light[0] == light[1] && light[1] == light[2] ? light[0] : luminance_rec709(light);
+}
+
 }  // namespace lensforge
