@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -66,19 +67,40 @@ struct CommandLine {
   std::vector<char*> pointers_;
 };
 
+/// Holds back the signals that stop a program while it lives. Between fork() and execv() they would
+/// end in the parent's handlers, and be lost.
+class StopsHeld {
+ public:
+  StopsHeld() {
+    sigset_t stops;
+    sigemptyset(&stops);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&stops, signal);
+    ::pthread_sigmask(SIG_BLOCK, &stops, &before_);
+  }
+  ~StopsHeld() { release(); }
+  StopsHeld(const StopsHeld&) = delete;
+  StopsHeld& operator=(const StopsHeld&) = delete;
+
+  void release() const { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+
+ private:
+  sigset_t before_{};
+};
+
 /// Starts the program in the child, with only the calls allowed between fork() and execv(). The
 /// child has its own process group: Ctrl-C on the terminal reaches it once, through the parent.
-[[noreturn]] void become(const char* program, const CommandLine& command, int in, int out, int err,
-                         pid_t parent) {
+[[noreturn]] void become(const char* program, const CommandLine& command,
+                         const std::array<int, 3>& streams, pid_t parent, const StopsHeld& held) {
   ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGINT);
   if (::getppid() != parent) ::_exit(kCannotStart);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXFSZ}) {
     std::signal(signal, signal == SIGXFSZ || signal == SIGPIPE ? SIG_IGN : SIG_DFL);
   }
-  ::dup2(in, STDIN_FILENO);
-  ::dup2(out, STDOUT_FILENO);
-  ::dup2(err, STDERR_FILENO);
+  held.release();
+  ::dup2(streams[0], STDIN_FILENO);
+  ::dup2(streams[1], STDOUT_FILENO);
+  ::dup2(streams[2], STDERR_FILENO);
   ::execv(program, command.pointers());
   ::_exit(kCannotStart);
 }
@@ -115,12 +137,16 @@ StepEnd run_step(Arguments program, const Arguments& words, const fs::path& out,
   const Descriptor messages = open_output(log, O_APPEND);
   const Descriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
   const pid_t parent = ::getpid();
-  const pid_t child = ::fork();
-  if (child < 0) fail("fork");
-  if (child == 0) {
-    become(program.front().c_str(), command, nothing.number(), result.number(), messages.number(),
-           parent);
+  pid_t child = -1;
+  {
+    const StopsHeld held;
+    child = ::fork();
+    if (child == 0) {
+      become(program.front().c_str(), command,
+             {nothing.number(), result.number(), messages.number()}, parent, held);
+    }
   }
+  if (child < 0) fail("fork");
   const int code = wait_for(child, stop);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
   return {code, spent.count()};

@@ -205,8 +205,12 @@ CommandResult run(CommandFrame& frame, BatchSettings& settings) {
   BatchRun batch(jobs, shard, place, frame);
   batch.run(settings.parallel, frame.stop_token());
   if (!settings.table.empty()) write_whole_file(settings.table, table_of(jobs, batch, place));
-  return {result_json(settings, jobs, batch), result_text(settings, jobs, batch),
-          exit_code(batch, frame.stop_token())};
+  CommandResult result{result_json(settings, jobs, batch), result_text(settings, jobs, batch),
+                       exit_code(batch, frame.stop_token())};
+  if (result.exit_code == kInterrupted) {
+    result.notes.emplace_back("interrupted; the same command does what is open");
+  }
+  return result;
 }
 
 Command<BatchSettings> command() {
