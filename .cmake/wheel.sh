@@ -22,5 +22,5 @@ gather_libraries "$folder/lensforge/lib" "$folder/lensforge/licences" "$extensio
 for module in "${modules[@]}"; do place_program "$module" '$ORIGIN'; done
 # shellcheck disable=SC2016
 place_program "$extension" '$ORIGIN/lib'
-"$python" "$here/pack_wheel.py" "$folder" "$version" "$OUT"
+"$python" "$here/lensforge_wheel.py" "$folder" "$version" "$OUT"
 rm -rf "$folder"
