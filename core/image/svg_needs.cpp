@@ -507,9 +507,10 @@ class Survey {
       if (name == silent) return false;
     }
     const auto drawn = drawn_elements();
-    if (svg && std::find(drawn.begin(), drawn.end(), name) != drawn.end()) return true;
     if (const UndrawnThing* thing = find_undrawn(undrawn_elements(), name)) {
       leave_out(*thing);
+    } else if (svg && std::find(drawn.begin(), drawn.end(), name) != drawn.end()) {
+      return true;
     } else if (is_new(name)) {
       leave_out("an element that SVG does not have ('" + printable_line(name, kLongestName) + "')",
                 "draw it with SVG's shapes and text");

@@ -12,12 +12,15 @@
 
 namespace lensforge {
 
-/// An SVG feature that librsvg (2.54) does not draw.
+/// An SVG feature that librsvg does not draw.
 struct UndrawnThing {
   std::string_view name;  ///< Name of the element, attribute or property.
   std::string_view what;  ///< Description in plain words.
   std::string_view advice;
   std::string_view harmless = "";  ///< Values without effect, separated by " | ".
+  unsigned drawn_since = kNever;   ///< Minor version of librsvg 2 that draws it.
+
+  static constexpr unsigned kNever = ~0U;
 };
 
 /// Elements of SVG and of programs that write it. Elements in neither this table nor
@@ -36,7 +39,7 @@ std::span<const UndrawnThing> undrawn_text_properties();
 std::span<const UndrawnThing> undrawn_properties();
 std::span<const UndrawnThing> undrawn_style_properties();
 
-/// The row with this name, or nullptr.
+/// The row with this name, or nullptr; without what the librsvg here draws.
 const UndrawnThing* find_undrawn(std::span<const UndrawnThing> table, std::string_view name);
 
 /// True if this value, trimmed, has no effect.
@@ -63,7 +66,7 @@ SvgNeeds svg_needs(std::string_view xml);
 /// @pre No other thread uses gdk-pixbuf.
 std::string with_fit_pictures(const std::string& xml, std::vector<std::string>& remarks);
 
-/// Collects findings from the lines that librsvg (2.54) prints about styles and values that it
+/// Collects findings from the lines that librsvg prints about styles and values that it
 /// ignores: one per kind, in the order of their kinds.
 class SvgLogReader {
  public:

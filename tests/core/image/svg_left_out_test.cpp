@@ -8,6 +8,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -89,7 +90,7 @@ std::vector<Row> element_rows() {
        "named colour"},
       {"<filter id='f' x='-1' y='-1' width='3' height='3'><feDropShadow dx='30' dy='0' "
        "flood-color='white'/></filter><rect width='20' height='20' filter='url(#f)'/>",
-       "", "shadow (feDropShadow)"},
+       "", "(feDropShadow)"},
       {"<rect width='50' height='50'><animate attributeName='fill' to='white' dur='1s'/></rect>",
        "", "animation (animate)"},
       {"<rect width='50' height='50'><set attributeName='fill' to='white'/></rect>", "",
@@ -117,7 +118,7 @@ std::vector<Row> attribute_rows() {
       {kText + "><tspan x='5 30 60'>Ab c</tspan></text>", text(""), "places of single letters"},
       {text("dx='0 10'"), text(""), "places of single letters"},
       {text("word-spacing='10'"), text(""), "word-spacing"},
-      {text("dominant-baseline='hanging'"), text(""), "dominant-baseline"},
+      {text("dominant-baseline='hanging'"), text(""), "(dominant-baseline)"},
       {text("style='text-transform:uppercase'"), text(""), "text-transform"},
       {text("style='text-shadow:9px 9px white'"), text(""), "text-shadow"},
       {text("style='font-feature-settings:\"smcp\"'"), text(""), "font-feature-settings"},
@@ -126,7 +127,7 @@ std::vector<Row> attribute_rows() {
       {"<path d='M0 10H9' stroke='white' stroke-dasharray='1' pathLength='3'/>",
        "<path d='M0 10H9' stroke='white' stroke-dasharray='1'/>", "pathLength"},
       {"<path d='M0 1H10' stroke='white' transform='scale(5)' vector-effect='non-scaling-stroke'/>",
-       "<path d='M0 1H10' stroke='white' transform='scale(5)'/>", "vector-effect"},
+       "<path d='M0 1H10' stroke='white' transform='scale(5)'/>", "(vector-effect)"},
       {area("transform='scale(.5)' transform-origin='50 50'"), area("transform='scale(.5)'"),
        "transform-origin"},
       {area("style='scale:.5'"), area(""), "a change of size (scale)"},
@@ -162,19 +163,37 @@ std::vector<Row> value_rows() {
       {"<style media='print'>.a{fill:white}</style>" + plain, kArea, "(media)"},
       {"<style>@import 'a.css';</style>", "", "@import"},
       {"<rect width='50' height='50' fill='url(#nowhere)'/>", "", "left out the paint '#"},
-      {"<polygon points='1,2 3' fill='white' x='1'/><use width='calc(1px)' href='#p'/>", "",
-       "an element 'use'"},
+      {"<use width='calc(1px)' href='#p'/>", "", "calc(1px)"},
+      {"<polygon points='1,2 3' fill='white'/>", "", "not understood"},
   };
+}
+
+/// True if a row of the tables is about a feature that the librsvg here draws.
+bool is_drawn_here(std::span<const UndrawnThing> table, const UndrawnThing& thing) {
+  return find_undrawn(table, thing.name) == nullptr;
+}
+
+bool is_drawn_here(const Row& row) {
+  for (const auto table : {undrawn_elements(), undrawn_text_properties(), undrawn_properties()}) {
+    for (const UndrawnThing& thing : table) {
+      if (is_drawn_here(table, thing) && thing.what.ends_with(row.named)) return true;
+    }
+  }
+  return false;
 }
 
 class SvgLeftOut : public ::testing::TestWithParam<Row> {};
 
-TEST_P(SvgLeftOut, IsNamedAndStillNotDrawn) {
+TEST_P(SvgLeftOut, IsNamedUnlessItIsDrawn) {
   const Row& row = GetParam();
   const SvgPicture picture = drawn(scene(row.content));
-  EXPECT_THAT(picture.left_out, Contains(HasSubstr(row.named))) << row.content;
-  EXPECT_EQ(picture.light, drawn(scene(row.drawn_as)).light)
-      << "librsvg draws it by now: " << row.content;
+  const bool same = picture.light == drawn(scene(row.drawn_as)).light;
+  EXPECT_EQ(same, !is_drawn_here(row)) << row.content;
+  if (is_drawn_here(row)) {
+    EXPECT_THAT(picture.left_out, Not(Contains(HasSubstr(row.named)))) << row.content;
+  } else {
+    EXPECT_THAT(picture.left_out, Contains(HasSubstr(row.named))) << row.content;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Elements, SvgLeftOut, ::testing::ValuesIn(element_rows()));
@@ -190,6 +209,7 @@ TEST(SvgLeftOut, EveryRowOfTheTablesIsNamed) {
   std::string content;
   std::vector<std::string_view> expected;
   for (const UndrawnThing& thing : undrawn_elements()) {
+    if (is_drawn_here(undrawn_elements(), thing)) continue;
     content += "<" + std::string(thing.name) + "/>";
     expected.push_back(thing.what);
   }
@@ -200,6 +220,7 @@ TEST(SvgLeftOut, EveryRowOfTheTablesIsNamed) {
   for (const auto table :
        {undrawn_text_properties(), undrawn_properties(), undrawn_style_properties()}) {
     for (const UndrawnThing& thing : table) {
+      if (is_drawn_here(table, thing)) continue;
       content += "<g style='" + std::string(thing.name) + ": 7px'/>";
       expected.push_back(thing.what);
     }
@@ -305,7 +326,7 @@ class Composer {
       const std::size_t kind = below(3);
       if (kind == 0 && depth > 0) {
         static const std::vector<std::string> kGroups{"g", "svg", "a", "g opacity='0.9'"};
-        const std::string group = kGroups[below(kGroups.size())];
+        const std::string& group = kGroups[below(kGroups.size())];
         content += "<" + group + ">" + compose(depth - 1, most) + "</" +
                    group.substr(0, group.find(' ')) + ">";
       } else if (kind == 1 && expected_.size() < most) {
@@ -328,6 +349,7 @@ class Composer {
     for (const auto& rows : {attribute_rows(), value_rows()}) {
       all.insert(all.end(), rows.begin(), rows.end());
     }
+    std::erase_if(all, [](const Row& row) { return is_drawn_here(row); });
     return all;
   }
 
@@ -338,12 +360,12 @@ class Composer {
         "<circle cx='40' cy='40' r='9' fill='#fff' style='stroke:rgb(1,2,3);stroke-width:2px'/>",
         "<path d='M0 0L9 9z' transform='rotate(30)' stroke='red' stroke-dasharray='1 2'/>",
         "<style>.z{fill:hsl(0,0%,50%)}</style><polygon class='z' points='0,0 9,0 9,9'/>",
-        "<defs><linearGradient id='lg'><stop stop-color='white'/></linearGradient></defs>"
-        "<ellipse rx='9' ry='4' fill='url(#lg)'/>",
-        "<clipPath id='cp'><circle r='20'/></clipPath><rect width='50' height='9' "
-        "clip-path='url(#cp)'/>",
-        "<filter id='bl'><feGaussianBlur stdDeviation='1'/></filter><line x2='9' y2='9' "
-        "stroke='white' filter='url(#bl)'/>",
+        std::string("<defs><linearGradient id='lg'><stop stop-color='white'/></linearGradient>") +
+            "</defs><ellipse rx='9' ry='4' fill='url(#lg)'/>",
+        std::string("<clipPath id='cp'><circle r='20'/></clipPath>") +
+            "<rect width='50' height='9' clip-path='url(#cp)'/>",
+        std::string("<filter id='bl'><feGaussianBlur stdDeviation='1'/></filter>") +
+            "<line x2='9' y2='9' stroke='white' filter='url(#bl)'/>",
         "<symbol id='sy'><rect width='3' height='3'/></symbol><use xlink:href='#sy' x='4'/>",
         text("letter-spacing='2' text-anchor='middle' font-weight='bold'"),
     };
