@@ -20,6 +20,7 @@ find "$1" -name '*.xml' -exec awk '
   /<skipped / {
     reason = attribute("message")
     sub(/^[^&]*&#x0A;/, "", reason)  # The source file and its line.
+    sub(/&#x0A;$/, "", reason)
     gsub(/&#x0A;/, " ", reason)
     gsub(/&quot;/, "\"", reason)
     gsub(/&apos;/, "\047", reason)

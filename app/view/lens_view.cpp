@@ -201,7 +201,8 @@ SampledSurface surface_of(const LayeredImage& layers, const std::string& name,
   const auto slope_y = layers.layer(name + ".slope_y");
   for (int row = 0; row < shape.rows; ++row) {
     for (int column = 0; column < shape.columns; ++column) {
-      const auto from = static_cast<std::size_t>((shape.rows - 1 - row) * shape.columns + column);
+      const auto from =
+          static_cast<std::size_t>(Eigen::Index{shape.rows - 1 - row} * shape.columns + column);
       const Eigen::Index to = Eigen::Index{row} * shape.columns + column;
       surface.mesh.vertices.col(to) << size.x() * column / (shape.columns - 1),
           size.y() * row / (shape.rows - 1), z[from];
@@ -228,7 +229,8 @@ std::vector<CausePicture> causes_of(const JsonFields& report, const fs::path& fo
   const std::string designed = surface_name::kDesigned;
   if (!layers.has(designed)) refuse(file, "has no layer " + designed);
   std::vector<CausePicture> causes{{"the surface between vertices", picture_of(layers, designed)}};
-  for (const nlohmann::json& entry : report.object("leakage").at("causes")) {
+  const JsonFields leakage = report.object("leakage");
+  for (const nlohmann::json& entry : leakage.at("causes")) {
     const std::string cause =
         JsonFields(entry, (folder / cam_file::kReport).string(), "leakage.causes.").text("cause");
     if (!layers.has(cause)) refuse(file, "has no layer " + cause);

@@ -123,10 +123,8 @@ http::status verdict(const Request& request, std::uint64_t body, int port) {
 
 /// Status for a header that could not be read; unknown if no answer is possible.
 http::status verdict(error_code error) {
-  static const auto& of_http = make_error_code(http::error::end_of_stream).category();
-  if (error == http::error::end_of_stream || error.category() != of_http) {
-    return http::status::unknown;
-  }
+  const error_code ended = make_error_code(http::error::end_of_stream);
+  if (error == ended || error.category() != ended.category()) return http::status::unknown;
   const bool too_long = error == http::error::header_limit || error == http::error::buffer_overflow;
   return too_long ? http::status::request_header_fields_too_large : http::status::bad_request;
 }

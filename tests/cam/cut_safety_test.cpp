@@ -10,6 +10,7 @@
 #include <optional>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cam/cam.h"
@@ -30,7 +31,6 @@ using lensforge::testing::small_lens;
 using lensforge::testing::TempFolder;
 using lensforge::testing::Way;
 using lensforge::testing::ways_of;
-using lensforge::testing::write_bytes;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -73,11 +73,11 @@ Deeds deeds_of(const CamResult& result, const CamOptions& options) {
   return deeds;
 }
 
-const LimitCheck& check_named(const CamResult& result, const std::string& key) {
+const LimitCheck& check_named(const CamResult& result, std::string_view key) {
   for (const LimitCheck& check : result.report.verdict.checks) {
     if (check.key == key) return check;
   }
-  throw std::runtime_error("no check " + key);
+  throw std::runtime_error("no check " + std::string(key));
 }
 
 /// A thin or thick lens of random relief.

@@ -49,11 +49,11 @@ missing_libraries() {
     sed -n 's/^[[:space:]]*\(.*\) => not found/\1/p'
 }
 
-# The package of bookworm that holds a shared library.
+# The packages that hold a shared library.
 package_of() {
   case $1 in
-    libboost_python311.so.*) echo libboost-python1.74.0 ;;
-    libpython3.11.so.*) echo libpython3.11 libpython3.11-stdlib libpython3.11-minimal ;;
+    libboost_python3*.so.*) echo "libboost-python${1##*.so.}" ;;
+    libpython3.*.so.*) echo "${1%.so.*}" "${1%.so.*}-stdlib" "${1%.so.*}-minimal" ;;
     libedit.so.2) echo libedit2 ;;
     libbsd.so.0) echo libbsd0 ;;
     libmd.so.0) echo libmd0 ;;
@@ -90,7 +90,9 @@ here=$(dirname "$(readlink -f "$0")")/root
 machine=$(uname -m)-linux-gnu
 export LD_LIBRARY_PATH="$here/usr/lib:$here/usr/lib/$machine:$here/lib/$machine"
 # Only where the Python library had to be fetched as well.
-if [ -d "$here/usr/lib/python3.11/encodings" ]; then export PYTHONHOME="$here/usr"; fi
+for encodings in "$here"/usr/lib/python3.*/encodings; do
+  [ ! -d "$encodings" ] || export PYTHONHOME="$here/usr"
+done
 exec "$here/usr/bin/rs274" "$@"
 END
   chmod +x "$launcher"

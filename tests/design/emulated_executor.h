@@ -123,9 +123,10 @@ class EmulatedExecutor {
   using PendingSum = FinishedSum<N>;
 
   static constexpr int kThreads = 128;  ///< Per block, as on the GPU.
-  /// True if arguments are searched for addresses. Without optimisation, or with sanitizers, copies
-  /// include the padding between members, which may hold old addresses.
-#if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  /// True if arguments are searched for addresses. Without optimisation, with sanitizers, by clang
+  /// and by GCC 14, copies include the padding between members, which may hold old addresses.
+#if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && \
+    !defined(__clang__) && __GNUC__ < 14
   static constexpr bool kFindsAddresses = true;
 #else
   static constexpr bool kFindsAddresses = false;

@@ -28,9 +28,7 @@ class SolidMesh : public ::testing::Test {
  protected:
   SurfaceMesh read() { return read_solid_mesh(path_); }
 
-  void write(const TopoDS_Shape& shape, const char* unit = "MM") {
-    write_foreign_step(shape, path_, unit);
-  }
+  void write(const TopoDS_Shape& shape) { write_foreign_step(shape, path_); }
 
   TempFolder folder_;
   std::filesystem::path path_ = folder_ / "solid.step";
@@ -108,7 +106,8 @@ TEST_F(SolidMesh, MovedAndMirroredSolidsStayWhereTheyAreAndLookOutwards) {
 }
 
 TEST_F(SolidMesh, InchesBecomeMillimetres) {
-  write(BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(25.4, 25.4, 50.8)).Shape(), "INCH");
+  write_foreign_step_in_inches(
+      BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(25.4, 25.4, 50.8)).Shape(), path_);
   EXPECT_NEAR(read().vertices.row(2).maxCoeff(), 50.8, 1e-6);
 }
 

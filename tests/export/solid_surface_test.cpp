@@ -31,9 +31,7 @@ class SolidSurfaceOf : public ::testing::Test {
     return read_solid_surface(path_, points, Executor::serial());
   }
 
-  void write(const TopoDS_Shape& shape, const char* unit = "MM") {
-    write_foreign_step(shape, path_, unit);
-  }
+  void write(const TopoDS_Shape& shape) { write_foreign_step(shape, path_); }
 
   void expect_refused(const char* why) {
     EXPECT_THAT(message_of<InputError>([&] { read(); }),
@@ -69,7 +67,7 @@ TEST_F(SolidSurfaceOf, SphereIsRoundAndHasItsHeights) {
 }
 
 TEST_F(SolidSurfaceOf, InchesBecomeMillimetres) {
-  write(lens_of_a_sphere(), "INCH");
+  write_foreign_step_in_inches(lens_of_a_sphere(), path_);
   EXPECT_NEAR(read().samples.mesh.vertices.row(0).maxCoeff(), 12.0, 0.8);
 }
 

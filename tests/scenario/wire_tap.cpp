@@ -48,8 +48,11 @@ std::string WireTap::sent() {
   return sent_;
 }
 
-bool WireTap::sends(const std::string& text) {
-  return comes_true([&] { return sent().find(text) != std::string::npos; });
+bool WireTap::sends(const std::string& text, const std::string& before) {
+  return comes_true([&] {
+    const std::string so_far = sent();
+    return so_far.find(text, so_far.find(before)) != std::string::npos;
+  });
 }
 
 void WireTap::pass_on() {

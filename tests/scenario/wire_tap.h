@@ -22,8 +22,8 @@ class WireTap {
   /// The sender's end.
   [[nodiscard]] const std::string& path() const { return near_.device(); }
   [[nodiscard]] std::string sent();
-  /// Waits for up to ten seconds until `text` was sent.
-  bool sends(const std::string& text);
+  /// Waits for up to ten seconds until `text` was sent, after `before` if that is given.
+  bool sends(const std::string& text, const std::string& before = {});
 
  private:
   void pass_on();

@@ -137,7 +137,7 @@ TEST(ToleranceForecast, ReportsItsPartsAndStopsBetweenThem) {
     total = progress.total;
     if (progress.done >= 3.0) stop.request_stop();
   });
-  EXPECT_THROW(toy.forecast(20, Executor::cpu(2), control), Interrupted);
+  EXPECT_THROW((void)toy.forecast(20, Executor::cpu(2), control), Interrupted);
   EXPECT_EQ(total, 1.0 + 20.0 + 5.0 * kErrorCauses);
 }
 
