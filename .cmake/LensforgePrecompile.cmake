@@ -36,8 +36,10 @@ endfunction()
 if(LENSFORGE_PRECOMPILED_HEADERS)
   # GCC 12 takes moved strings for arrays that are written beyond their end. In headers of the standard
   # library it keeps that to itself, but not once they are precompiled.
-  target_compile_options(lensforge_options INTERFACE
-    -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow -Wno-stringop-overread)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    target_compile_options(lensforge_options INTERFACE
+      -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow -Wno-stringop-overread)
+  endif()
   find_package(Eigen3 3.4 REQUIRED)
   lensforge_precompiled_headers(lensforge_common_headers
     HEADERS ${LENSFORGE_COMMON_HEADERS} LINK Eigen3::Eigen)
