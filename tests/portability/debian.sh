@@ -14,9 +14,10 @@ ROOT=$(realpath -m "${3:-build/portability}")/$RELEASE
 SOURCES=/lensforge-$COMPILER
 
 make_root "$RELEASE" "$ROOT"
-# Build outputs stay, so that a second run after a small change is quick.
-mkdir -p "$ROOT$SOURCES"
-git archive HEAD | tar -x -C "$ROOT$SOURCES"
+# A clone leaves files alone that did not change, and so their build outputs.
+[[ -d $ROOT$SOURCES/.git ]] || git clone -q . "$ROOT$SOURCES"
+git -C "$ROOT$SOURCES" fetch -q origin HEAD
+git -C "$ROOT$SOURCES" reset -q --hard FETCH_HEAD
 
 compiler() {
   [[ $COMPILER == clang ]] || { echo 'export CC=gcc CXX=g++'; return; }
