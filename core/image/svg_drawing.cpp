@@ -224,7 +224,9 @@ class PixelSum {
     const std::uint32_t blue = point & 0xFFU;
     if (red != green || green != blue) colour_ = true;
     const double luminance =
-        grey_light({light(red, alpha), light(green, alpha), light(blue, alpha)});
+        red == green && green == blue
+            ? light(red, alpha)
+            : luminance_rec709({light(red, alpha), light(green, alpha), light(blue, alpha)});
     sum_ += luminance * static_cast<double>(alpha) / 255.0;
   }
 

@@ -4,7 +4,7 @@
 # roots in FOLDER (build/portability) make of a picture on Debian 12 and on Debian 13: lenses of every model and several
 # kinds of light, programs, reports, solids, meshes, pages. Left out are seconds, dates, and how PNG and 3MF files are
 # packed and what their libraries tell of themselves. Exit code 1 if anything else differs; the files are kept then, in
-# FOLDER/RELEASE/compared.
+# FOLDER/RELEASE/compared. Needs python3-pil.
 set -euo pipefail
 [[ $# -ge 1 && $# -le 2 ]] || { sed -n '3,7s/^# //p' "$0" >&2; exit 2; }
 PICTURE=$(realpath "$1") ROOTS=$(realpath "${2:-build/portability}")
@@ -43,55 +43,27 @@ for release in bookworm trixie; do
     s/("([a-z_]*seconds|date|written)": )[^,}]*/\1-/; s/[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9:]{8}/-/
     s/[0-9]{8}\.[0-9]{6},/-,/g; s/(Made in )[0-9.]+/\1-/; s/, [0-9.]+ s$/, - s/' {} +
 done
-python3 - "$ROOTS" <<'PYTHON'
-import base64, pathlib, re, struct, sys, zipfile, zlib
+/usr/bin/python3 - "$ROOTS" <<'PYTHON'
+import base64, io, pathlib, re, sys, zipfile
+
+import PIL.Image
 
 
-def unpacked(png):
-    """The rows of a PNG file (https://www.w3.org/TR/png-3) as they are before filters and packing."""
-    packed, at = b"", 8
-    while at < len(png):
-        length, kind = struct.unpack(">I4s", png[at:at + 8])
-        content = png[at + 8:at + 8 + length]
-        if kind == b"IHDR":
-            parts = content
-            columns, rows, depth, colour = struct.unpack(">IIBB", content[:10])
-        if kind == b"IDAT":
-            packed += content
-        at += length + 12
-    bits = depth * {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}[colour]
-    step, length = max(1, bits // 8), (columns * bits + 7) // 8
-    data, above = zlib.decompress(packed), bytes(length)
-    for row in range(rows):
-        begin = row * (length + 1)
-        rule, line = data[begin], bytearray(data[begin + 1:begin + 1 + length])
-        for i in range(length):
-            left, corner = (line[i - step], above[i - step]) if i >= step else (0, 0)
-            up = above[i]
-            if rule == 1:
-                line[i] = line[i] + left & 255
-            elif rule == 2:
-                line[i] = line[i] + up & 255
-            elif rule == 3:
-                line[i] = line[i] + (left + up) // 2 & 255
-            elif rule == 4:
-                nearest = min((left, up, corner), key=lambda value: abs(left + up - corner - value))
-                line[i] = line[i] + nearest & 255
-        parts += line
-        above = line
-    return parts
+def pixels(png):
+    with PIL.Image.open(io.BytesIO(png)) as picture:
+        return f"{picture.mode} {picture.size} ".encode() + picture.tobytes()
 
 
 def plain(path):
     data = path.read_bytes()
     if path.suffix == ".png":
-        return unpacked(data)
+        return pixels(data)
     if path.suffix == ".3mf":
         with zipfile.ZipFile(path) as archive:
             return b"".join(name.encode() + archive.read(name) for name in sorted(archive.namelist()))
     if path.suffix == ".html":
         return re.sub(rb"(data:image/png;base64,)([A-Za-z0-9+/=]+)",
-                      lambda match: match[1] + unpacked(base64.b64decode(match[2])), data)
+                      lambda match: match[1] + pixels(base64.b64decode(match[2])), data)
     return data
 
 
