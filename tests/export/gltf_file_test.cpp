@@ -44,9 +44,9 @@ struct Glb {
 
   /// The numbers of an accessor, one column an item.
   template <class Scalar, int kRows>
-  [[nodiscard]] Eigen::Matrix<Scalar, kRows, Eigen::Dynamic> values(int accessor) const {
+  [[nodiscard]] Eigen::Matrix<Scalar, kRows, Eigen::Dynamic> values(std::size_t accessor) const {
     const nlohmann::json& about = json["accessors"][accessor];
-    const nlohmann::json& view = json["bufferViews"][about["bufferView"].get<int>()];
+    const nlohmann::json& view = json["bufferViews"][about["bufferView"].get<std::size_t>()];
     Eigen::Matrix<Scalar, kRows, Eigen::Dynamic> all(kRows, about["count"].get<Eigen::Index>());
     const std::size_t bytes = sizeof(Scalar) * static_cast<std::size_t>(all.size());
     EXPECT_EQ(view["byteLength"], bytes);
@@ -128,10 +128,12 @@ TEST_F(GltfFile, TheSurfaceHasItsOwnNormalsAndTheWallsTheirs) {
 
 TEST_F(GltfFile, StatesTheBoxOfItsPositions) {
   const Glb glb = written();
-  for (int k = 0; k < 3; ++k) {
-    const nlohmann::json& about = glb.json["accessors"][0];
-    EXPECT_EQ(about["min"][k].get<float>(), glb.positions().row(k).minCoeff());
-    EXPECT_EQ(about["max"][k].get<float>(), glb.positions().row(k).maxCoeff());
+  const Eigen::Vector3f least = glb.positions().rowwise().minCoeff();
+  const Eigen::Vector3f largest = glb.positions().rowwise().maxCoeff();
+  const nlohmann::json& about = glb.json["accessors"][0];
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(about["min"][k].get<float>(), least[static_cast<Eigen::Index>(k)]);
+    EXPECT_EQ(about["max"][k].get<float>(), largest[static_cast<Eigen::Index>(k)]);
   }
 }
 

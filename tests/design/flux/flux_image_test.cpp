@@ -194,7 +194,8 @@ double product(std::span<const double> a, std::span<const double> b) {
 TEST(SourceBlur, IsTheSumOfItsDefinition) {
   const SourceKernel kernel = source_kernel(wide_source(), 5.0);
   const int parts = kernel.parts;
-  const std::vector<double> in = random_values(kColumns * kRows * parts * parts, 1);
+  const std::vector<double> in =
+      random_values(static_cast<std::size_t>(kColumns * kRows * parts * parts), 1);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
   const std::span<const double> out = blur.apply(Executor::serial(), in);
   for (int row = 0; row < kRows; ++row) {
