@@ -279,8 +279,10 @@ Image random_scene(testing::Random& random, int columns, int rows) {
   for (float& value : image.values()) value = static_cast<float>(ground);
   const int shapes = 1 + random.below(6);
   for (int s = 0; s < shapes; ++s) {
-    const Eigen::Vector2d a(random.between(0.0, columns), random.between(0.0, rows));
-    const Eigen::Vector2d way = random.below(2) * 0.5 * columns * random.vector2();
+    const double y = random.between(0.0, rows);
+    const Eigen::Vector2d a(random.between(0.0, columns), y);
+    const double length = random.below(2) * 0.5 * columns;
+    const Eigen::Vector2d way = length * random.vector2();
     const double radius = random.between(1.5, way.isZero() ? 20.0 : 4.0);
     const auto light = static_cast<float>(random.between(0.1, 1.0));
     for (int r = 0; r < rows; ++r) {
@@ -323,7 +325,9 @@ TEST(LevelStart, HasNoFoldedAndNoTinyTriangleForAnyPicture) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(seed);
     testing::Random random(seed);
-    const Image picture = random_scene(random, 46 + random.below(8), 40 + random.below(8));
+    const int rows = 40 + random.below(8);
+    const int columns = 46 + random.below(8);
+    const Image picture = random_scene(random, columns, rows);
     DesignOptions options =
         two_levels(random.below(2) == 0 ? SurfaceModel::kFacet : SurfaceModel::kSmooth, picture);
     options.rounds = 1 + random.below(4);
