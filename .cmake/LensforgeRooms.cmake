@@ -17,6 +17,10 @@ target_compile_options(lensforge_options INTERFACE -fPIC -fno-semantic-interposi
 if(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
   # Clang 22 refuses the consteval functions of fmt in OpenImageIO 2.5's headers.
   target_compile_definitions(lensforge_options INTERFACE FMT_CONSTEVAL=)
+  # Boost 1.74 has values beyond their enumeration's in its headers. From 20 on Clang has no such option.
+  if(CMAKE_CXX_COMPILER_VERSION VERSION_LESS 20)
+    target_compile_options(lensforge_options INTERFACE -Wno-enum-constexpr-conversion)
+  endif()
 endif()
 if(LENSFORGE_WERROR)
   target_compile_options(lensforge_options INTERFACE -Werror)
