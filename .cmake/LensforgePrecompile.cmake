@@ -39,6 +39,9 @@ if(LENSFORGE_PRECOMPILED_HEADERS)
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     target_compile_options(lensforge_options INTERFACE
       -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow -Wno-stringop-overread)
+  elseif(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
+    # So does Clang with what that library itself uses although it is deprecated.
+    target_compile_options(lensforge_options INTERFACE -Wno-deprecated-declarations)
   endif()
   find_package(Eigen3 3.4 REQUIRED)
   lensforge_precompiled_headers(lensforge_common_headers
