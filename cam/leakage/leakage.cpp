@@ -410,9 +410,7 @@ std::vector<CellRange> worst_squares(const LeakMap& map, const LeakPlaceOptions&
   std::vector<CellRange> worst;
   for (const auto& [sum, square] : ranked_squares(map, std::max(1, options.span))) {
     if (sum <= 0.0 || std::ssize(worst) >= options.count) break;
-    const auto meets = [&square = square](const CellRange& other) {
-      return are_near(square, other);
-    };
+    const auto meets = [&here = square](const CellRange& other) { return are_near(here, other); };
     if (std::none_of(worst.begin(), worst.end(), meets)) worst.push_back(square);
   }
   return worst;
