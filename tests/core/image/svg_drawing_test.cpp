@@ -286,7 +286,7 @@ TEST(SvgDrawing, RefusesPackedTextThatIsTruncatedOrTooLong) {
   EXPECT_THAT(refusal_of(packed("no drawing")), HasSubstr("is no picture"));
 }
 
-/// A file that keeps the libraries busy for longer than anybody waits, and then fails.
+/// A file that keeps the libraries busy for longer than anybody waits.
 std::string endless_line() { return text_in("DejaVu Sans", std::string(2'000'000, 'x')); }
 
 /// A file that crashes them: their reader of selectors calls itself.
@@ -298,10 +298,9 @@ std::string deep_selector() {
 }
 
 TEST(SvgDrawing, ACrashOfTheLibrariesIsARefusalInOneLine) {
-  for (const std::string& text : {deep_selector(), endless_line()}) {
-    EXPECT_THAT(refusal_of(text), AllOf(HasSubstr("cannot be drawn: the program that draws SVG"),
-                                        HasSubstr("use fewer or simpler elements")));
-  }
+  EXPECT_THAT(refusal_of(deep_selector()),
+              AllOf(HasSubstr("cannot be drawn: the program that draws SVG"),
+                    HasSubstr("use fewer or simpler elements")));
 }
 
 TEST(SvgDrawing, MemoryHasALimit) {
