@@ -112,7 +112,7 @@ namespace {
 class ChainPictures {
  public:
   ChainPictures(const LeakageChain& chain, const FieldRenderSetup& setup, const Executor& executor,
-                const RunControl& control, const TileObserver& observe) {
+                const RunControl& control) {
     std::vector<const SurfaceField*> fields;
     std::vector<const NamedSurface*> apart;
     const auto take = [&](const NamedSurface& surface) {
@@ -124,7 +124,8 @@ class ChainPictures {
     for (const NamedSurface& step : chain.steps) take(step);
     take(chain.designed);
     for (const NamedSurface& other : chain.others) take(other);
-    std::vector<FluxPicture> rendered = render_fields(fields, setup, executor, control, observe);
+    std::vector<FluxPicture> rendered =
+        render_fields(fields, setup, executor, control, chain.observe);
     for (std::size_t f = 0; f < fields.size(); ++f) pictures_[fields[f]] = std::move(rendered[f]);
     for (const NamedSurface* surface : apart) {
       FieldRenderSetup own = setup;
@@ -189,13 +190,12 @@ std::vector<double> surplus(const FluxPicture& part, const FluxPicture& designed
 
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
-                              const Executor& executor, const RunControl& control,
-                              const TileObserver& observe) {
+                              const Executor& executor, const RunControl& control) {
   validate(options);
   LF_CHECK(!chain.steps.empty(), chain.designed.name);
   LF_CHECK(target.columns() == setup.optics.pixels.x() && target.rows() == setup.optics.pixels.y(),
            std::to_string(target.columns()) + "x" + std::to_string(target.rows()));
-  const ChainPictures pictures(chain, setup, executor, control, observe);
+  const ChainPictures pictures(chain, setup, executor, control);
   LeakageResult result;
   result.designed = {chain.designed.name, pictures.of(chain.designed), {}};
   const PictureJudge judge(target, result.designed.picture, options);
@@ -267,10 +267,9 @@ double mae_of(const FluxPicture& picture, const Image& target) {
 
 }  // namespace
 
-SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& part,
-                             const LeakageResult& result, const Image& target,
-                             const FieldRenderSetup& setup, const Executor& executor,
-                             const RunControl& control) {
+SamplingCheck check_sampling(const LeakageChain& chain, const LeakageResult& result,
+                             const Image& target, const FieldRenderSetup& setup,
+                             const Executor& executor, const RunControl& control) {
   const RunControl silent(control.stop_token(), {});
   FieldRenderSetup fine_setup = setup;
   fine_setup.grid = with_half_the_spacing(setup.grid);
@@ -286,9 +285,9 @@ SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& p
     return picture;
   };
   const FluxPicture& before = result.part().picture;
-  const FluxPicture now = with_fine_windows(part, before);
+  const FluxPicture now = with_fine_windows(*chain.part().field, before);
   const FluxPicture& design_before = result.designed.picture;
-  const FluxPicture design_now = with_fine_windows(designed, design_before);
+  const FluxPicture design_now = with_fine_windows(*chain.designed.field, design_before);
   double cells = 0.0;
   for (const CellRange& window : windows) cells += area_of(window);
   const double scale = area_of(all_cells(setup.grid)) / cells;

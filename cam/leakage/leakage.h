@@ -98,12 +98,18 @@ inline constexpr const char* kDecimals = "decimals";
 inline constexpr const char* kPitchError = "pitch error";  ///< If the workshop states one.
 }  // namespace leak_cause
 
+/// Called for every sampled tile of a surface; the patch includes one more node around it where
+/// there is one.
+using TileObserver =
+    std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
+
 /// Surfaces from the designed one to the part; each adds one cause of wrong light to the one
 /// before.
 struct LeakageChain {
   NamedSurface designed;
   std::vector<NamedSurface> steps;   ///< Named after the added cause; the last is the part.
   std::vector<NamedSurface> others;  ///< Only rendered and compared.
+  TileObserver observe = {};         ///< Sees the tiles of those without a grid of their own.
 
   [[nodiscard]] const NamedSurface& part() const { return steps.back(); }
 };
@@ -147,11 +153,6 @@ struct LeakageResult {
   [[nodiscard]] const RenderedSurface& part() const { return steps.back(); }
 };
 
-/// Called for every sampled tile of a surface; the patch includes one more node around it where
-/// there is one.
-using TileObserver =
-    std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
-
 /// Renders every surface of a chain and splits the leakage by cause. A surface that occurs in the
 /// chain more than once (the same object) is rendered once. With an extended source the designed
 /// surface is also rendered in the light of a point: the additional light in the dark pixels is the
@@ -160,8 +161,7 @@ using TileObserver =
 /// @throw InputError if dark_below and bright_from break their rules; Interrupted.
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
-                              const Executor& executor, const RunControl& control,
-                              const TileObserver& observe = {});
+                              const Executor& executor, const RunControl& control);
 
 /// 1 where `part` has more flux than `designed`, 0 elsewhere. @pre equal sizes.
 std::vector<double> pixels_with_surplus(const FluxPicture& part, const FluxPicture& designed);
@@ -180,13 +180,12 @@ struct SamplingCheck {
 /// Renders kSamplingWindows² windows, evenly spaced over the lens, at half the spacing and
 /// extrapolates the change to the whole lens. Costs about a fifth of the two surfaces' pictures for
 /// 128² pixels and less for more.
-/// @param designed, part  the first and the last surface of the chain behind `result`.
+/// @param chain  behind `result`.
 /// @param target  with the setup's pixels.
 /// @throw Interrupted.
-SamplingCheck check_sampling(const SurfaceField& designed, const SurfaceField& part,
-                             const LeakageResult& result, const Image& target,
-                             const FieldRenderSetup& setup, const Executor& executor,
-                             const RunControl& control);
+SamplingCheck check_sampling(const LeakageChain& chain, const LeakageResult& result,
+                             const Image& target, const FieldRenderSetup& setup,
+                             const Executor& executor, const RunControl& control);
 
 /// Number of windows along a side of the lens.
 inline constexpr int kSamplingWindows = 6;

@@ -101,15 +101,12 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
     other.grid = lens_grid(lens.setup.lens_size, scallop_spacings(options, lens.setup, passes));
   }
   CreaseMapper creases(grid, {});
-  const auto keep = [&](const SurfaceField& field, const CellRange& tile,
-                        const SurfacePatch& patch) {
+  chain.observe = [&](const SurfaceField& field, const CellRange& tile, const SurfacePatch& patch) {
     layers.take(field, patch, executor);
     if (&field == &surfaces.rounded()) creases.add(tile, patch, executor);
   };
-  result.leakage =
-      measure_leakage(chain, lens.target, setup, options.leakage, executor, control, keep);
-  result.sampling = check_sampling(surfaces.designed(), surfaces.part(), result.leakage,
-                                   lens.target, setup, executor, control);
+  result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  result.sampling = check_sampling(chain, result.leakage, lens.target, setup, executor, control);
   const std::vector<double> weights =
       pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
   const LeakMap map =

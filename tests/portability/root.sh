@@ -7,6 +7,8 @@ make_root() {
   [[ ! -e $2/etc/debian_version ]] || return 0
   mkdir -p "$(dirname "$2")"
   mmdebstrap --variant=minbase --include=ca-certificates "$1" "$2" "${MIRROR:-http://deb.debian.org/debian}" >&2
+  # No package brings it: an installer writes it.
+  [[ -e $2/etc/hosts ]] || printf '127.0.0.1 localhost\n::1 localhost\n' >"$2/etc/hosts"
 }
 
 # in_root ROOT SCRIPT: runs a script of bash there, in an empty environment and in mounts that end with it.

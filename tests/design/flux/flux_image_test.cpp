@@ -191,11 +191,16 @@ double product(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
+/// Number of the parts of all pixels.
+std::size_t part_count(const SourceKernel& kernel) {
+  const auto parts = static_cast<std::size_t>(kernel.parts);
+  return parts * parts * kColumns * kRows;
+}
+
 TEST(SourceBlur, IsTheSumOfItsDefinition) {
   const SourceKernel kernel = source_kernel(wide_source(), 5.0);
   const int parts = kernel.parts;
-  const std::vector<double> in =
-      random_values(static_cast<std::size_t>(kColumns * kRows * parts * parts), 1);
+  const std::vector<double> in = random_values(part_count(kernel), 1);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
   const std::span<const double> out = blur.apply(Executor::serial(), in);
   for (int row = 0; row < kRows; ++row) {
@@ -218,7 +223,7 @@ TEST(SourceBlur, IsTheSumOfItsDefinition) {
 TEST(SourceBlur, TheAdjointIsTheTranspose) {
   const SourceKernel kernel = source_kernel(wide_source(), 5.0);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
-  const auto fine = static_cast<std::size_t>(kColumns * kRows * kernel.parts * kernel.parts);
+  const std::size_t fine = part_count(kernel);
   const std::vector<double> in = random_values(fine, 2);
   const std::vector<double> bar = random_values(kColumns * kRows, 3);
   const double forward = product(blur.apply(Executor::serial(), in), bar);
@@ -230,8 +235,7 @@ TEST(SourceBlur, TheAdjointIsTheTranspose) {
 
 TEST(SourceBlur, SameBitsForAnyNumberOfThreads) {
   const SourceKernel kernel = source_kernel(wide_source(), 5.0);
-  const std::vector<double> in =
-      random_values(static_cast<std::size_t>(kColumns * kRows * kernel.parts * kernel.parts), 4);
+  const std::vector<double> in = random_values(part_count(kernel), 4);
   SourceBlurOn<Executor> one(kernel, kColumns, kRows, Executor::serial());
   SourceBlurOn<Executor> three(kernel, kColumns, kRows, Executor::cpu(3));
   const std::span<const double> a = one.apply(Executor::serial(), in);
@@ -243,8 +247,8 @@ TEST(SourceBlur, APointOfLightBecomesTheSourcesImageWithItsMoments) {
   const OpticalSetup setup = wide_source();
   const SourceKernel kernel = source_kernel(setup, 5.0);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
-  const auto width = static_cast<std::size_t>(kColumns * kernel.parts);
-  std::vector<double> in(width * static_cast<std::size_t>(kRows * kernel.parts), 0.0);
+  const std::size_t width = kColumns * static_cast<std::size_t>(kernel.parts);
+  std::vector<double> in(part_count(kernel), 0.0);
   // The four parts of the middle pixel.
   for (const std::size_t y : {16U, 17U}) {
     for (const std::size_t x : {20U, 21U}) in[y * width + x] = 0.25;
@@ -252,8 +256,9 @@ TEST(SourceBlur, APointOfLightBecomesTheSourcesImageWithItsMoments) {
   const std::span<const double> out = blur.apply(Executor::serial(), in);
   Eigen::Vector2d mean(0.0, 0.0);
   for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::size_t row = i / kColumns;
     mean += out[i] * Eigen::Vector2d(static_cast<double>(i % kColumns) - 10.0,
-                                     static_cast<double>(i / kColumns) - 8.0);
+                                     static_cast<double>(row) - 8.0);
   }
   EXPECT_NEAR(std::accumulate(out.begin(), out.end(), 0.0), 1.0, 1e-12);
   Eigen::Vector2d expected(0.0, 0.0);
