@@ -106,11 +106,11 @@ void require_cover(const std::vector<CurvePiece>& curve, const AxisLine& line, d
   if (to - covered > kGap) throw_nothing_under(line, covered);
 }
 
-/// Appends the drop curve of facets.
-void add_facets(const DropCutter& cutter, const AxisLine& line, double from, double to, double bow,
+/// Appends the drop curve of facets between held_from and held_to.
+void add_facets(const DropCutter& cutter, const RowSpan& span, double bow,
                 const std::stop_token& stop, RowProfile& profile) {
-  const std::vector<CurvePiece> curve = drop_curve(cutter, line, from, to);
-  require_cover(curve, line, from, to);
+  const std::vector<CurvePiece> curve = drop_curve(cutter, span.line, span.held_from, span.held_to);
+  require_cover(curve, span.line, span.held_from, span.held_to);
   profile.u.reserve(profile.u.size() + 4 * curve.size());
   profile.z.reserve(profile.z.size() + 4 * curve.size());
   for (const CurvePiece& piece : curve) {
@@ -222,7 +222,7 @@ void RowCurves::follow_facets(const RowSpan& span, double from, double to, doubl
     const double number = std::floor(at / kFacetStretch);
     const double end = std::min(to, (number + 1.0) * kFacetStretch);
     const DropCutter& cutter = facets(span.line.along, static_cast<std::int64_t>(number));
-    add_facets(cutter, span.line, at, end, bow, stop_, profile);
+    add_facets(cutter, {span.line, span.from, span.to, at, end}, bow, stop_, profile);
     at = end;
   }
 }
@@ -338,7 +338,7 @@ RowProfile RowCurves::profile(const RowSpan& span, double bow) const {
     roll(span, bow, profile);
   } else {
     const DropCutter& cutter = given_ != nullptr ? *given_ : *made_;
-    add_facets(cutter, span.line, span.held_from, span.held_to, bow, stop_, profile);
+    add_facets(cutter, span, bow, stop_, profile);
   }
   profile.z.front() = profile.z[1];
   add_node(span.to, profile.z.back(), profile);

@@ -30,6 +30,27 @@ constexpr int kMaxSunPositions = 1000;
 constexpr int kMaxSeeds = 1000000000;
 constexpr int kMaxFaces = 1000000;
 
+/// What the shape has to keep.
+void describe_bounds(Description& d, ReflectOptions& o) {
+  d.text("--fix-box", o.fix_box, "X,Y,Z,X,Y,Z",
+         "vertices inside this box do not move; its lowest and highest corner");
+  d.text("--fix-plane", o.fix_plane, "NX,NY,NZ,D",
+         "vertices with nx*x + ny*y + nz*z <= d do not move");
+  d.text("--fix-vertices", o.fix_vertices, "FILE",
+         "numbers, from 0, of the vertices of the file that do not move");
+  d.text("--planar-faces", o.planar_faces, "FILE",
+         "numbers, from 0, of faces that stay in one plane; a line for every plane");
+  d.word("--symmetry", o.symmetry,
+         {{"none", Symmetry::kNone}, {"x", Symmetry::kX}, {"y", Symmetry::kY}, {"z", Symmetry::kZ}},
+         "keep both halves mirror images across this axis at the box's middle");
+  d.flag("--keep-volume", o.keep_volume, "keep the volume of a closed mesh");
+  d.flag("--keep-box", o.keep_box, "let nothing leave the bounding box");
+  d.number("--max-displacement", o.max_displacement, Limits::zero_or(1e-9, 1e9),
+           "units of the mesh", "move no vertex farther; 0 sets no limit");
+  d.number("--min-thickness", o.min_thickness, Limits::zero_or(1e-9, 1e9), "units of the mesh",
+           "keep this much material behind every vertex that has it; 0 sets no limit");
+}
+
 }  // namespace
 
 void describe(Description& d, ReflectOptions& o) {
@@ -73,23 +94,7 @@ void describe(Description& d, ReflectOptions& o) {
             "do not split the edges that hamper creases, nor update the faces once more");
   d.whole("--faces", o.faces, Limits::zero_or(20, kMaxFaces),
           "remesh to about so many even triangles first; 0 takes the mesh as it is");
-  d.text("--fix-box", o.fix_box, "X,Y,Z,X,Y,Z",
-         "vertices inside this box do not move; its lowest and highest corner");
-  d.text("--fix-plane", o.fix_plane, "NX,NY,NZ,D",
-         "vertices with nx*x + ny*y + nz*z <= d do not move");
-  d.text("--fix-vertices", o.fix_vertices, "FILE",
-         "numbers, from 0, of the vertices of the file that do not move");
-  d.text("--planar-faces", o.planar_faces, "FILE",
-         "numbers, from 0, of faces that stay in one plane; a line for every plane");
-  d.word("--symmetry", o.symmetry,
-         {{"none", Symmetry::kNone}, {"x", Symmetry::kX}, {"y", Symmetry::kY}, {"z", Symmetry::kZ}},
-         "keep both halves mirror images across this axis at the box's middle");
-  d.flag("--keep-volume", o.keep_volume, "keep the volume of a closed mesh");
-  d.flag("--keep-box", o.keep_box, "let nothing leave the bounding box");
-  d.number("--max-displacement", o.max_displacement, Limits::zero_or(1e-9, 1e9),
-           "units of the mesh", "move no vertex farther; 0 sets no limit");
-  d.number("--min-thickness", o.min_thickness, Limits::zero_or(1e-9, 1e9), "units of the mesh",
-           "keep this much material behind every vertex that has it; 0 sets no limit");
+  describe_bounds(d, o);
   d.number("--radar", o.radar_ghz, Limits::zero_or(0.01, 1000), "GHz",
            "compute radar cross-sections around the horizon too, for a mesh in millimetres; "
            "0 computes none");

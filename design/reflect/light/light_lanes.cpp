@@ -48,6 +48,9 @@ LF_WIDE_LANES void select_loop(Eigen::Index count, const std::uint8_t* __restric
   for (Eigen::Index d = 0; d < count; ++d) selected[d] = (flags[d] & bit) != 0 ? value[d] : 0.0;
 }
 
+// Arrays are parameters of their own: __restrict holds for nothing else.
+// NOLINTBEGIN(readability-function-size)
+
 LF_WIDE_LANES void reflect_loop(Eigen::Index count, Vec3<double> n, Axes<double> l, Axes<double> o,
                                 const double* __restrict lit, double* __restrict value,
                                 double* __restrict along_light, double* __restrict along_sensor) {
@@ -116,6 +119,8 @@ LF_WIDE_LANES LossSums sum_loop(Eigen::Index count, Axes<double> l, Axes<double>
   return {total(value), {total(x), total(y), total(z)}, total(curvature)};
 }
 
+// NOLINTEND(readability-function-size)
+
 /// A hit's cosine and the mirror images of w across n_k and of −w across n_q.
 struct HitLobes {
   explicit HitLobes(const HitGeometry& hit)
@@ -129,6 +134,7 @@ struct HitLobes {
   Vec3<float> n_q;
 };
 
+// NOLINTNEXTLINE(readability-function-size)  As above.
 LF_WIDE_LANES void twice_loop(Eigen::Index count, HitLobes hit, Axes<float> l, Axes<float> o,
                               const std::uint8_t* __restrict lit, float* __restrict value,
                               float* __restrict at_most) {
@@ -157,6 +163,7 @@ void reflect_directly(const Eigen::Vector3d& n, const LaneVectors<double>& light
                direct.value.data(), direct.along_light.data(), direct.along_sensor.data());
 }
 
+// NOLINTNEXTLINE(readability-function-size)  One array for each of a sum's factors.
 LossSums sum_losses(Loss loss, const DirectLanes& direct, const Eigen::VectorXd& indirect,
                     const Eigen::VectorXd& weight, const LaneVectors<double>& light,
                     const LaneVectors<double>& sensor, LossLanes& lanes) {
