@@ -17,6 +17,7 @@
 #include "core/mesh/surface_mesh.h"
 #include "core/schema/description.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/mesh/faces.h"
 #include "design/reflect/radar.h"
@@ -433,8 +434,9 @@ std::vector<std::vector<int>> number_groups(const std::string& option, const std
       const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
       const bool whole = error == std::errc() && end == word.data() + word.size();
       if (!whole || number < 0 || number >= limit) {
-        throw InputError(option + " " + file + ": " + word +
-                         " is no number of the mesh: must be 0 to " + std::to_string(limit - 1));
+        throw InputError(
+            joined({option, " ", file, ": ", word, " is no number of the mesh: must be 0 to ",
+                    std::to_string(limit - 1)}));
       }
       group.push_back(number);
     }

@@ -211,11 +211,14 @@ TEST(SourceBlur, IsTheSumOfItsDefinition) {
           const int y = parts * row + j - kernel.offset_y;
           const int x = parts * column + i - kernel.offset_x;
           if (y < 0 || y >= parts * kRows || x < 0 || x >= parts * kColumns) continue;
-          sum += kernel.weights[static_cast<std::size_t>(j * kernel.columns + i)] *
-                 in[static_cast<std::size_t>(y * parts * kColumns + x)];
+          const int weight = j * kernel.columns + i;
+          const int place = y * parts * kColumns + x;
+          sum += kernel.weights[static_cast<std::size_t>(weight)] *
+                 in[static_cast<std::size_t>(place)];
         }
       }
-      EXPECT_NEAR(out[static_cast<std::size_t>(row * kColumns + column)], sum, 1e-12);
+      const int pixel = row * kColumns + column;
+      EXPECT_NEAR(out[static_cast<std::size_t>(pixel)], sum, 1e-12);
     }
   }
 }
