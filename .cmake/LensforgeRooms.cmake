@@ -14,6 +14,8 @@ target_compile_options(lensforge_options INTERFACE
 target_compile_options(lensforge_options INTERFACE -ffp-contract=off -fno-math-errno)
 # The Python module is a shared library of the same rooms.
 target_compile_options(lensforge_options INTERFACE -fPIC -fno-semantic-interposition)
+# Boost 1.74 tells every build of deprecated headers that its own headers include.
+target_compile_definitions(lensforge_options INTERFACE BOOST_ALLOW_DEPRECATED_HEADERS)
 if(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
   # Clang 22 refuses the consteval functions of fmt in OpenImageIO 2.5's headers.
   target_compile_definitions(lensforge_options INTERFACE FMT_CONSTEVAL=)

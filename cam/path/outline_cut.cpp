@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boost 1.74 tells every build of deprecated headers that its own include.
-#define BOOST_ALLOW_DEPRECATED_HEADERS
-
 #include "cam/path/outline_cut.h"
 
 #include <algorithm>

@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Boost 1.74 tells every build of deprecated headers that its own include.
-#define BOOST_ALLOW_DEPRECATED_HEADERS
-
 #include <boost/geometry.hpp>
 #include <boost/geometry/geometries/point_xy.hpp>
 #include <boost/geometry/geometries/polygon.hpp>

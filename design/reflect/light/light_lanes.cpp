@@ -119,8 +119,6 @@ LF_WIDE_LANES LossSums sum_loop(Eigen::Index count, Axes<double> l, Axes<double>
   return {total(value), {total(x), total(y), total(z)}, total(curvature)};
 }
 
-// NOLINTEND(readability-function-size)
-
 /// A hit's cosine and the mirror images of w across n_k and of −w across n_q.
 struct HitLobes {
   explicit HitLobes(const HitGeometry& hit)
@@ -134,7 +132,6 @@ struct HitLobes {
   Vec3<float> n_q;
 };
 
-// NOLINTNEXTLINE(readability-function-size)  As above.
 LF_WIDE_LANES void twice_loop(Eigen::Index count, HitLobes hit, Axes<float> l, Axes<float> o,
                               const std::uint8_t* __restrict lit, float* __restrict value,
                               float* __restrict at_most) {
@@ -148,6 +145,8 @@ LF_WIDE_LANES void twice_loop(Eigen::Index count, HitLobes hit, Axes<float> l, A
     at_most[d] = mask * (reflected_at_most(c_k, hit.cos_k) * reflected_at_most(c_q, cos_q));
   }
 }
+
+// NOLINTEND(readability-function-size)
 
 }  // namespace
 
@@ -163,11 +162,10 @@ void reflect_directly(const Eigen::Vector3d& n, const LaneVectors<double>& light
                direct.value.data(), direct.along_light.data(), direct.along_sensor.data());
 }
 
-// NOLINTNEXTLINE(readability-function-size)  One array for each of a sum's factors.
 LossSums sum_losses(Loss loss, const DirectLanes& direct, const Eigen::VectorXd& indirect,
-                    const Eigen::VectorXd& weight, const LaneVectors<double>& light,
-                    const LaneVectors<double>& sensor, LossLanes& lanes) {
-  weigh_loop(light.rows(), loss, direct.value.data(), indirect.data(), weight.data(),
+                    const LaneVectors<double>& light, const LaneVectors<double>& sensor,
+                    LossLanes& lanes) {
+  weigh_loop(light.rows(), loss, direct.value.data(), indirect.data(), lanes.weight.data(),
              lanes.value.data(), lanes.slope.data(), lanes.curvature.data());
   return sum_loop(light.rows(), Axes<double>(light), Axes<double>(sensor),
                   direct.along_light.data(), direct.along_sensor.data(), lanes.value.data(),

@@ -156,8 +156,10 @@ void reflect_directly(const Eigen::Vector3d& n, const LaneVectors<double>& light
 
 /// The weighted loss of every direction with its derivatives by the radiance.
 struct LossLanes {
-  explicit LossLanes(Eigen::Index count) : value(count), slope(count), curvature(count) {}
+  explicit LossLanes(Eigen::Index count)
+      : weight(count), value(count), slope(count), curvature(count) {}
 
+  Eigen::VectorXd weight;  ///< Given.
   Eigen::VectorXd value;
   Eigen::VectorXd slope;
   Eigen::VectorXd curvature;  ///< Size of the second derivative at the direct light.
@@ -170,10 +172,11 @@ struct LossSums {
   double curvature = 0.0;    ///< Σ weight·loss″(direct)·|∂L/∂n|²
 };
 
-/// @param indirect  light added to the direct light. @param lanes  receives the summands.
+/// @param indirect  light added to the direct light. @param lanes  with its weights; receives the
+///               summands.
 LossSums sum_losses(Loss loss, const DirectLanes& direct, const Eigen::VectorXd& indirect,
-                    const Eigen::VectorXd& weight, const LaneVectors<double>& light,
-                    const LaneVectors<double>& sensor, LossLanes& lanes);
+                    const LaneVectors<double>& light, const LaneVectors<double>& sensor,
+                    LossLanes& lanes);
 
 /// A path by which light reaches face k by way of face q.
 struct HitGeometry {

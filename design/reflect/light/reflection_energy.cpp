@@ -291,7 +291,6 @@ class ReflectionEnergy::FaceLight {
         light_(paths_.light_lanes()),
         sensor_(paths_, light_),
         lit_(light_.rows()),
-        weight_(light_.rows()),
         direct_(light_.rows()),
         indirect_(light_.rows()),
         loss_(light_.rows()) {}
@@ -301,7 +300,7 @@ class ReflectionEnergy::FaceLight {
     face_ = face;
     toward_ = &sensor_.of(face);
     const std::uint8_t* const flags = paths_.flags(face);
-    select_lanes(flags, LightPaths::kSeen, energy_.weight_lanes_, weight_);
+    select_lanes(flags, LightPaths::kSeen, energy_.weight_lanes_, loss_.weight);
     select_lanes(flags, LightPaths::kLit, energy_.one_lanes_, lit_);
     reflect_directly(normals_.col(face), light_, *toward_, lit_, direct_);
     indirect_.setZero();
@@ -309,7 +308,7 @@ class ReflectionEnergy::FaceLight {
   }
 
   [[nodiscard]] LossSums sums() {
-    LossSums sums = sum_losses(energy_.loss_, direct_, indirect_, weight_, light_, *toward_, loss_);
+    LossSums sums = sum_losses(energy_.loss_, direct_, indirect_, light_, *toward_, loss_);
     const double scale = energy_.scale(face_);
     sums.value *= scale;
     sums.gradient *= scale;
@@ -370,7 +369,6 @@ class ReflectionEnergy::FaceLight {
   const LaneVectors<double>* toward_ = nullptr;
   Eigen::Index face_ = 0;
   Eigen::VectorXd lit_;
-  Eigen::VectorXd weight_;
   DirectLanes direct_;
   Eigen::VectorXd indirect_;
   LossLanes loss_;

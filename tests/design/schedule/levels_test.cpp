@@ -279,6 +279,7 @@ Image random_scene(testing::Random& random, int columns, int rows) {
   for (float& value : image.values()) value = static_cast<float>(ground);
   const int shapes = 1 + random.below(6);
   for (int s = 0; s < shapes; ++s) {
+    // One draw a statement: compilers differ in which argument they evaluate first.
     const double y = random.between(0.0, rows);
     const Eigen::Vector2d a(random.between(0.0, columns), y);
     const double length = random.below(2) * 0.5 * columns;

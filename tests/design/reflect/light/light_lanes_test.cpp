@@ -100,12 +100,12 @@ TEST(LightLanes, LossesAddUpToThoseOfOneDirectionAfterTheOther) {
   DirectLanes direct(count);
   reflect_directly(n, light.lanes, sensor.lanes, Eigen::VectorXd::Ones(count), direct);
   const Eigen::VectorXd indirect = Eigen::VectorXd::LinSpaced(count, 0.0, 0.3);
-  Eigen::VectorXd weight = Eigen::VectorXd::Zero(count);
-  weight.head(Directions::kCount).setLinSpaced(0.1, 1.0);
   LossLanes lanes(count);
+  Eigen::VectorXd& weight = lanes.weight;
+  weight.setZero();
+  weight.head(Directions::kCount).setLinSpaced(0.1, 1.0);
   for (const Loss loss : {Loss::kSquare, Loss::kNegativeSquare, Loss::kInverse}) {
-    const LossSums sums =
-        sum_losses(loss, direct, indirect, weight, light.lanes, sensor.lanes, lanes);
+    const LossSums sums = sum_losses(loss, direct, indirect, light.lanes, sensor.lanes, lanes);
     double value = 0.0;
     double curvature = 0.0;
     Vector3d gradient = Vector3d::Zero();
