@@ -67,6 +67,7 @@ inline double slope_error(const Scalar& f, const Eigen::VectorXd& x,
   const double expected = products.sum();
   const double scale = std::max(std::fabs(expected), products.norm());
   std::vector<double> errors;
+  errors.reserve(steps.size());
   for (const double step : steps) {
     errors.push_back(std::fabs(directional_slope(f, x, direction, step) - expected) / scale);
   }
