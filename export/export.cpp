@@ -95,8 +95,9 @@ ExportFormat export_format(const ExportOptions& options, const fs::path& out) {
   std::string known;
   for (const auto& [word, meaning] : formats()) {
     if (meaning == kByExtension) continue;
-    if (extension == "." + word) return meaning;
-    known = with_word(std::move(known), "." + word);
+    const std::string ending = joined({".", word});
+    if (extension == ending) return meaning;
+    known = with_word(std::move(known), ending);
   }
   throw InputError("--out " + out.string() + ": must end in one of " + known +
                    ", or --format must say what to write");

@@ -119,8 +119,7 @@ const OutputFolder& CommandFrame::begin_folder(const fs::path& out) {
 }
 
 RunControl CommandFrame::control(std::function<void()> accepted) {
-  const RunControl shown =
-      host_ ? *host_ : RunControl(work_->watch->token(), work_->progress->sink());
+  RunControl shown = host_ ? *host_ : RunControl(work_->watch->token(), work_->progress->sink());
   if (!accepted) return shown;
   work_->accepted = std::move(accepted);
   return {shown.stop_token(), [this, shown](const Progress& progress) {

@@ -79,9 +79,10 @@ RestMap::RestMap(const SmoothBed& bed, double reach, const Executor& executor)
 }
 
 Eigen::AlignedBox2d RestMap::box_of(std::int64_t cell) const {
+  const std::int64_t row = cell / columns_;
   const Eigen::Vector2d corner =
-      box_.min() + cell_ * Eigen::Vector2d(static_cast<double>(cell % columns_),
-                                           static_cast<double>(cell / columns_));
+      box_.min() +
+      cell_ * Eigen::Vector2d(static_cast<double>(cell % columns_), static_cast<double>(row));
   const Eigen::Vector2d end = corner + Eigen::Vector2d::Constant(cell_);
   return {nearest_inside(box_, corner), nearest_inside(box_, end)};
 }

@@ -350,8 +350,8 @@ class Drawing {
   [[nodiscard]] std::string result() const {
     return svg_.drawing(
         joined({"viewBox=\"0 0 ", decimal_text(width(), 0), " ", decimal_text(height(), 0),
-                "\" role=\"img\" aria-label=\"Coupon from above\" "
-                "font-family=\"Arial, sans-serif\" font-size=\"13\""}));
+                "\" role=\"img\" aria-label=\"Coupon from above\"",
+                " font-family=\"Arial, sans-serif\" font-size=\"13\""}));
   }
 
  private:

@@ -207,11 +207,11 @@ CutChoices parse_choices(std::span<const std::string> words, const std::string& 
     const std::string key = word.substr(0, equals);
     constexpr std::array<std::string_view, 5> kKeys{"tool", "pitch", "large", "slope", "mae"};
     if (equals == std::string::npos || std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
-      throw InputError(option + ": " + word +
-                       " is not tool=MM,MM…, pitch=MM,MM…, slope=RAD,RAD…, large=TOOL,TOOL… or "
-                       "mae=GOAL");
+      throw InputError(
+          joined({option, ": ", word, " is not tool=MM,MM…, pitch=MM,MM…, slope=RAD,RAD…, ",
+                  "large=TOOL,TOOL… or mae=GOAL"}));
     }
-    take_list(key, std::string_view(word).substr(equals + 1), option + " " + key, choices);
+    take_list(key, std::string_view(word).substr(equals + 1), joined({option, " ", key}), choices);
   }
   const auto count_of = [](const auto& values) { return std::max<std::size_t>(values.size(), 1); };
   const std::size_t count = count_of(choices.tools) * count_of(choices.pitches) *

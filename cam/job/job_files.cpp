@@ -77,7 +77,7 @@ std::string stated_job(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string line(kLongestLine, '\0');
   for (std::size_t i = 0; i < kLinesToJob && file.getline(line.data(), kLongestLine); ++i) {
-    const std::string text = lower_case(line.c_str());
+    const std::string text = lower_case(line.substr(0, line.find('\0')));
     const std::size_t at = text.find(kJobKey);
     if (at != 1) continue;
     return text.substr(at + kJobKey.size(), text.find_last_not_of(")\r") + 1 - at - kJobKey.size());

@@ -97,9 +97,10 @@ SmoothReach::SmoothReach(const SmoothBed& bed, const Executor& executor)
   free_.resize(static_cast<std::size_t>(columns_ * rows_));
   const Eigen::Vector2d around = Eigen::Vector2d::Constant(kMargin);
   const auto judge = [&](std::int64_t i) {
+    const std::int64_t row = i / columns_;
     const Eigen::Vector2d corner =
-        box_.min() + cell_ * Eigen::Vector2d(static_cast<double>(i % columns_),
-                                             static_cast<double>(i / columns_));
+        box_.min() +
+        cell_ * Eigen::Vector2d(static_cast<double>(i % columns_), static_cast<double>(row));
     const Eigen::AlignedBox2d under(
         Eigen::Vector2d(corner - around),
         Eigen::Vector2d(corner + Eigen::Vector2d::Constant(cell_) + around));
@@ -293,7 +294,7 @@ LowestBall LowestBallSearch::over(const Eigen::Vector2d& q, const TangentPlane& 
   const double radius = cutter_.radius();
   const Eigen::Vector3d normal =
       Eigen::Vector3d(-plane.slope.x(), -plane.slope.y(), 1.0).normalized();
-  const LowestBall tangent{plane.z, Eigen::Vector3d(q.x(), q.y(), plane.z) + radius * normal, 0.0};
+  LowestBall tangent{plane.z, Eigen::Vector3d(q.x(), q.y(), plane.z) + radius * normal, 0.0};
   near = cutter_.drop(tangent.centre.head<2>(), near);
   if (!near.rests() || near.tip + radius <= tangent.centre.z() + resting_) return tangent;
   Contacts contacts(cutter_, q);

@@ -333,6 +333,7 @@ std::vector<fs::path> final_names(const std::vector<ReadPart>& parts, const Grou
                                   const ProgramContext& context, const fs::path& folder) {
   if (parts.size() == 1) return {folder / (group.stem + "." + context.post.extension)};
   std::vector<fs::path> names;
+  names.reserve(parts.size());
   for (const ReadPart& part : parts) names.push_back(part.part->file().path());
   return names;
 }

@@ -319,11 +319,10 @@ std::string summary(const ReportData& data) {
 std::string view_link(const ReportData& data) {
   if (data.leakage.steps.empty()) return "";
   const std::string lens = escape_html(data.job);
-  return element(
-      "p", "class=\"screen\"",
-      joined({"After <code>lensforge view ", lens, " --out ", lens,
-              "/view.html</code>: <a href=\"../view.html\">the light of this part, to be "
-              "moved and asked</a>."}));
+  return element("p", "class=\"screen\"",
+                 joined({"After <code>lensforge view ", lens, " --out ", lens,
+                         "/view.html</code>: <a href=\"../view.html\">the light of this part, ",
+                         "to be moved and asked</a>."}));
 }
 
 }  // namespace

@@ -90,7 +90,7 @@ std::vector<Eigen::Vector3d> balanced_colors(const std::vector<double>& waveleng
   std::vector<Eigen::Vector3d> colors;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t k = 0; k < wavelengths.size(); ++k) {
-    colors.push_back(rgb_of_xyz() * color_matching(wavelengths[k]));
+    colors.emplace_back(rgb_of_xyz() * color_matching(wavelengths[k]));
     if (!powers.empty()) colors.back() *= powers[k];
     sum += colors.back();
   }

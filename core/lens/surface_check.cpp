@@ -46,7 +46,8 @@ HalfCell half_cell(const SurfaceMesh& mesh, const GridShape& shape, std::int64_t
   if (column.maxCoeff() != low.x() + 1 || row.maxCoeff() != low.y() + 1) return {};
   std::array<bool, 4> has{};
   for (int k = 0; k < 3; ++k) {
-    has[static_cast<std::size_t>(column[k] - low.x() + 2 * (row[k] - low.y()))] = true;
+    const int quarter = column[k] - low.x() + 2 * (row[k] - low.y());
+    has[static_cast<std::size_t>(quarter)] = true;
   }
   if (std::count(has.begin(), has.end(), true) != 3) return {};
   return {std::int64_t{low.y()} * (shape.columns - 1) + low.x(),

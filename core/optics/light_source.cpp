@@ -19,10 +19,7 @@ LightSource::LightSource(const OpticalSetup& setup)
     : direction_(Eigen::Vector3d::UnitZ()),
       position_(Eigen::Vector3d::Zero()),
       axis_(Eigen::Vector3d::UnitZ()),
-      eta_(setup.ior),
-      scale_(1.0),
-      lambertian_(0.0),
-      kind_(Kind::kAlongZ) {
+      eta_(setup.ior) {
   if (setup.front) front_ = FrontSurface(*setup.front);
   std::visit([&](const auto& lamp) { set(lamp, setup); }, setup.lamp);
 }
@@ -111,7 +108,8 @@ std::vector<SourcePoint> shape_points(const SourceExtent& extent, int count) {
   std::vector<SourcePoint> points;
   for (int r = 0; r < shape.rows; ++r) {
     for (int c = 0; c < shape.columns; ++c) {
-      const double weight = shape.weights[static_cast<std::size_t>(r * shape.columns + c)];
+      const int pixel = r * shape.columns + c;
+      const double weight = shape.weights[static_cast<std::size_t>(pixel)];
       if (weight > 0.0) divide_pixel({c, r}, parts, {upper_left, weight / total}, points);
     }
   }

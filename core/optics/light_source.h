@@ -526,11 +526,11 @@ class LightSource {
 
   Eigen::Vector3d direction_;  ///< Behind a flat front or before a curved one.
   Eigen::Vector3d position_;
-  Eigen::Vector3d axis_;  ///< Axis of a flat source, towards the middle of the lens.
-  double eta_;            ///< n_lens / n_air
-  double scale_;          ///< mm² per steradian; negative if triangles are seen from above.
-  double lambertian_;     ///< 1 of a flat source, 0 of an even one.
-  Kind kind_;
+  Eigen::Vector3d axis_;     ///< Axis of a flat source, towards the middle of the lens.
+  double eta_;               ///< n_lens / n_air
+  double scale_ = 1.0;       ///< mm² per steradian; negative if triangles are seen from above.
+  double lambertian_ = 0.0;  ///< 1 of a flat source, 0 of an even one.
+  Kind kind_ = Kind::kAlongZ;
   FrontSurface front_;  ///< The lens's front, if curved.
 };
 

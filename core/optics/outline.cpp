@@ -22,8 +22,9 @@ using Polygon = std::vector<Eigen::Vector2d>;
 
 /// Adds the corners of a quarter of a circle, from angle `quarter` · 90° on.
 void add_quarter(const Eigen::Vector2d& centre, double radius, int quarter, Polygon& points) {
-  for (int k = 0; k <= kChords / 4; ++k) {
-    const double angle = 2.0 * std::numbers::pi * (quarter * (kChords / 4) + k) / kChords;
+  constexpr int kOfQuarter = kChords / 4;
+  for (int k = 0; k <= kOfQuarter; ++k) {
+    const double angle = 2.0 * std::numbers::pi * (quarter * kOfQuarter + k) / kChords;
     points.emplace_back(centre.x() + radius * std::cos(angle),
                         centre.y() + radius * std::sin(angle));
   }

@@ -61,7 +61,7 @@ struct Scene {
   /// Drawn position of a point relative to the part's middle. Its direction is kept; if the drawing
   /// is not to scale, its distance d is shown as asinh(d).
   [[nodiscard]] Vector3d shown(const Vector3d& p) const {
-    const Vector3d from = p - middle;
+    Vector3d from = p - middle;
     const double d = from.norm() / unit;
     if (to_scale || d == 0.0) return from;
     return from * (std::asinh(d) / d);
@@ -352,7 +352,8 @@ class Axes {
     }
     low_ = static_cast<int>(std::floor(least));
     high_ = std::max(low_ + 1, static_cast<int>(std::ceil(most)));
-    top_ += kNameHeight * static_cast<double>((curves.size() - 1) / kNamesPerLine);
+    const std::size_t lines = (curves.size() - 1) / kNamesPerLine;
+    top_ += kNameHeight * static_cast<double>(lines);
   }
 
   [[nodiscard]] double seconds() const { return seconds_; }
@@ -406,8 +407,9 @@ std::string lines_of(const std::vector<PlotCurve>& curves, const Axes& axes) {
     const std::string_view color = kColors[i % kColors.size()];
     lines += joined({"<polyline points=\"", points, "\" fill=\"none\" stroke-width=\"2\" stroke=\"",
                      color, "\"/>"});
+    const std::size_t line = i / kNamesPerLine;
     lines += plot_words(kPlotLeft + kNameWidth * static_cast<double>(i % kNamesPerLine),
-                        kPlotMargin - 10.0 + kNameHeight * static_cast<double>(i / kNamesPerLine),
+                        kPlotMargin - 10.0 + kNameHeight * static_cast<double>(line),
                         joined({"fill=\"", color, "\""}), curves[i].name);
   }
   return lines;

@@ -259,6 +259,7 @@ Field& Description::list(const std::string& name, std::vector<Item>& items,
   Field field{{.name = name, .kind = FieldKind::kList, .help = help}};
   field.parts = [&items] {
     std::vector<Description> all;
+    all.reserve(items.size());
     for (Item& item : items) all.push_back(description_of(item));
     return all;
   };

@@ -22,6 +22,7 @@ std::string_view trimmed(std::string_view text) {
 std::vector<double> parse_numbers(std::string_view text, const std::string& name, int count) {
   const auto refuse = [&] {
     std::vector<double> example;  // Not all zero: a direction needs a length.
+    example.reserve(static_cast<std::size_t>(count));
     for (int k = 0; k < count; ++k) example.push_back(k % 3);
     throw InputError(name + " " + std::string(text) + ": must be " + std::to_string(count) +
                      " finite numbers with commas between them, such as " + numbers_text(example));

@@ -81,7 +81,7 @@ std::string printable_line(std::string_view text, std::size_t max_bytes) {
     cut_text.append(text.substr(0, 2 * max_bytes)).append(text.substr(text.size() - 2 * max_bytes));
     text = cut_text;
   }
-  const std::string line = harmless(text);
+  std::string line = harmless(text);
   if (line.size() <= max_bytes) return line;
   std::size_t head = (max_bytes - kCut.size()) / 2;
   std::size_t tail = line.size() - (max_bytes - kCut.size() - head);

@@ -118,7 +118,8 @@ class SplineObjectiveOn {
       const int i = u.first[static_cast<std::size_t>(node_u)] + j;
       const int row = v.first[static_cast<std::size_t>(node_v)] + k;
       const auto tap = [](const AxisBasis& basis, int node, int n) {
-        return basis.plan_value[static_cast<std::size_t>(basis.taps * node + n)];
+        const int at = basis.taps * node + n;
+        return basis.plan_value[static_cast<std::size_t>(at)];
       };
       if (tap(u, node_u, j) * tap(v, node_v, k) == 0.0) return;
       movable.col(Eigen::Index{row} * u.coefficients + i).template head<2>().setZero();

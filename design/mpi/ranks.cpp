@@ -284,7 +284,7 @@ class Transfer {
     pass(index);
     std::size_t kind = 0;
     if (takes_) ((kind++ == index ? void(value.template emplace<Kinds>()) : void()), ...);
-    std::visit([this](auto& held) { pass(held); }, value);
+    std::visit([this](auto& held) { this->pass(held); }, value);
   }
   void pass(std::shared_ptr<const HeightSpline>& spline) const {
     HeightGrid grid = takes_ ? HeightGrid() : spline->grid();

@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 #include "design/reflect/mesh/faces.h"
 
 // Notation
@@ -281,10 +282,10 @@ std::string radar_svg(const RadarComparison& comparison) {
   for (int ring = 1; ring <= kRings; ++ring) {
     const std::string radius = decimal_text(ring * kRing, 0);
     const std::string middle = decimal_text(kHalf, 0);
-    svg += "<circle cx=\"" + middle + "\" cy=\"" + middle + "\" r=\"" + radius +
-           "\" fill=\"none\" stroke=\"#ccc\"/>\n<text x=\"" + middle + "\" y=\"" +
-           decimal_text(kHalf - ring * kRing, 0) + "\" fill=\"#666\">" +
-           decimal_text(outer - 10.0 * (kRings - ring), 0) + " dBsm</text>\n";
+    svg += joined({"<circle cx=\"", middle, "\" cy=\"", middle, "\" r=\"", radius,
+                   "\" fill=\"none\" stroke=\"#ccc\"/>\n<text x=\"", middle, "\" y=\"",
+                   decimal_text(kHalf - ring * kRing, 0), "\" fill=\"#666\">",
+                   decimal_text(outer - 10.0 * (kRings - ring), 0), " dBsm</text>\n"});
   }
   svg += curve(comparison.before, outer, "#c33") + curve(comparison.after, outer, "#236");
   return svg +

@@ -41,7 +41,7 @@ class Strips {
   }
   /// light_on() for all strips.
   [[nodiscard]] LightPath light() const {
-    const LightPath light(setup_);
+    LightPath light(setup_);
     if (light.intake_is_plan_area()) return light;
     double intake = 0.0;
     for (int k = 0; k < count(); ++k) intake += intake_of(strip(k).mesh, light);

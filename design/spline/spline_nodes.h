@@ -100,7 +100,8 @@ class AxisTapsOn {
     std::vector<int> end(begin.size(), 0);
     for (int k = 0; k < basis.nodes(); ++k) {
       for (int j = 0; j < basis.taps; ++j) {
-        const auto c = static_cast<std::size_t>(basis.first[static_cast<std::size_t>(k)] + j);
+        const int coefficient = basis.first[static_cast<std::size_t>(k)] + j;
+        const auto c = static_cast<std::size_t>(coefficient);
         begin[c] = std::min(begin[c], k);
         end[c] = k + 1;
       }

@@ -126,6 +126,7 @@ std::vector<Eigen::Vector2d> straightened(std::vector<Eigen::Vector2d> points) {
 void require_simple(const SurfaceMesh& surface, const std::vector<int>& loop,
                     const std::string& name) {
   std::vector<Eigen::Vector2d> points;
+  points.reserve(loop.size());
   for (const int v : loop) points.emplace_back(flat(surface, v));
   points = straightened(std::move(points));
   if (const auto fault = polygon_fault(points)) refuse(name, "has a bad outline: " + *fault);

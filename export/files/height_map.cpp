@@ -19,7 +19,9 @@ GridShape height_map_shape(const Eigen::Vector2d& size, int longer_side) {
 Image height_map(const OpticalSurface& surface, int longer_side, const Executor& executor,
                  const RunControl& control) {
   const Eigen::Vector2d size = surface.box().sizes();
-  const auto [columns, rows] = height_map_shape(size, longer_side);
+  const GridShape shape = height_map_shape(size, longer_side);
+  const int columns = shape.columns;
+  const int rows = shape.rows;
   Image image(columns, rows);
   const auto set_height = [&](std::int64_t i) {
     const std::int64_t column = i % columns;

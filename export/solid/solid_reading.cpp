@@ -147,7 +147,7 @@ std::pair<double, double> FaceSampler::normal_range() const {
 
 std::optional<FacePoint> FaceSampler::above(const Eigen::Vector2d& xy) {
   if (!last_) last_ = nearest_probe(xy);
-  if (const auto found = newton(*last_, xy)) return found;
+  if (auto found = newton(*last_, xy)) return found;
   return newton(nearest_probe(xy), xy);
 }
 
@@ -353,9 +353,9 @@ class RowSampler {
   /// The point on the previous point's face, or else on the first face that has it.
   [[nodiscard]] std::optional<FacePoint> at(int column, int row) {
     const Eigen::Vector2d xy = raster_.at(column, row);
-    if (const auto found = above(last_, xy)) return found;
+    if (auto found = above(last_, xy)) return found;
     for (std::size_t i = 0; i < faces_.size(); ++i) {
-      const auto found = above(i, xy);
+      auto found = above(i, xy);
       if (!found) continue;
       last_ = i;
       return found;
@@ -667,7 +667,7 @@ SurfaceMesh tessellated(const fs::path& path, const RunControl& control) {
   const TopoDS_Shape shape = read_step_shape(path, control);
   const double diagonal = diagonal_of(shape);
   if (!(diagonal > 0.0)) throw InputError(path.string() + ": holds no faces");
-  BRepMesh_IncrementalMesh(shape, kSolidDeflection * diagonal, false, kSolidTurn);
+  const BRepMesh_IncrementalMesh meshed(shape, kSolidDeflection * diagonal, false, kSolidTurn);
   FaceJoiner joiner(shape);
   int number = 0;
   for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {

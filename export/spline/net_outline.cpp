@@ -163,7 +163,8 @@ class VolumeSum {
   [[nodiscard]] double clipped_cell(const Eigen::Vector2d& at) const {
     std::array<Eigen::Vector3d, std::size_t{kSquares + 1} * (kSquares + 1)> points;
     const auto point = [&](int i, int j) -> Eigen::Vector3d& {
-      return points[static_cast<std::size_t>(j * (kSquares + 1) + i)];
+      const int number = j * (kSquares + 1) + i;
+      return points[static_cast<std::size_t>(number)];
     };
     for (int j = 0; j <= kSquares; ++j) {
       for (int i = 0; i <= kSquares; ++i) {

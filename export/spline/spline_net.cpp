@@ -328,6 +328,7 @@ std::vector<Eigen::MatrixXd> restrictions(const std::vector<int>& lines) {
 
 std::vector<double> places(const std::vector<int>& lines, double from, double to) {
   std::vector<double> result;
+  result.reserve(lines.size());
   for (const int line : lines) result.push_back(from + (to - from) * line / lines.back());
   return result;
 }

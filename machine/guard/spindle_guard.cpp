@@ -273,6 +273,7 @@ constexpr std::size_t kMaxRecords = 20000;
 
 std::vector<RegisterMap> maps_of(const std::vector<GuardedDevice>& devices) {
   std::vector<RegisterMap> maps;
+  maps.reserve(devices.size());
   for (const GuardedDevice& device : devices) maps.push_back(device.map);
   return maps;
 }

@@ -378,7 +378,7 @@ void require_rest(Dialogue& dialogue, const StatusReport& report, bool resume) {
 
 /// Resets a controller that has not answered yet. @return its banner
 std::string wake(Dialogue& dialogue) {
-  const std::string banner = dialogue.try_reset(kLastTry);
+  std::string banner = dialogue.try_reset(kLastTry);
   if (banner.empty()) Dialogue::silence();
   return banner;
 }

@@ -309,7 +309,7 @@ void require_same_place(const JournalRecord& record, const ControllerInfo& info)
   const auto origins = info.start.tool_origins();
   for (std::size_t i = 0; i < origins.size(); ++i) {
     const Eigen::Vector3d was = record.origins->at(i);
-    const Eigen::Vector3d is = origins.at(i);
+    const Eigen::Vector3d& is = origins.at(i);
     if ((was - is).cwiseAbs().maxCoeff() <= kOriginTolerance) continue;
     throw InputError("G" + std::to_string(54 + i) + " began at " + point_text(was) +
                      " when the job was begun and begins at " + point_text(is) +

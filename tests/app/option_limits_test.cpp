@@ -17,7 +17,6 @@
 namespace lensforge::app {
 namespace {
 
-using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 /// Values just outside of limits.

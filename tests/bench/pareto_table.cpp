@@ -135,6 +135,7 @@ std::string commit_row(const std::string& label, const std::vector<Measured>& al
 
 std::string plot(const std::vector<Measured>& all) {
   std::vector<PlotCurve> curves;
+  curves.reserve(all.size());
   for (const Measured& m : all) curves.push_back({m.name, m.profile.errors});
   return decade_plot(curves, "MAE over processor seconds");
 }

@@ -26,8 +26,9 @@ ProgramOperation raster(std::int64_t moves) {
   operation.stream = [moves](const MoveSink& sink) {
     std::vector<PathMove> row(kMovesOfRow);
     for (std::int64_t first = 0; first < moves; first += kMovesOfRow) {
-      const auto y = 0.06 * static_cast<double>(first / kMovesOfRow);
-      const bool forth = (first / kMovesOfRow) % 2 == 0;
+      const std::int64_t number = first / kMovesOfRow;
+      const auto y = 0.06 * static_cast<double>(number);
+      const bool forth = number % 2 == 0;
       for (std::int64_t i = 0; i < kMovesOfRow; ++i) {
         const double x = 0.05 * static_cast<double>(forth ? i : kMovesOfRow - i);
         PathMove& move = row[static_cast<std::size_t>(i)];

@@ -280,7 +280,9 @@ std::vector<int> mirror_partners(const SurfaceMesh& mesh, int axis) {
     image[axis] = low[axis] + high[axis] - image[axis];
     double nearest = reach;
     for (int i = 0; i < 27; ++i) {
-      const Eigen::Vector3d beside(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      const int along_y = i / 3 % 3;
+      const int along_z = i / 9;
+      const Eigen::Vector3d beside(i % 3 - 1, along_y - 1, along_z - 1);
       const auto [begin, end] = cells.equal_range(cell(image + reach * beside));
       for (auto it = begin; it != end; ++it) {
         const double distance = (mesh.vertices.col(it->second) - image).norm();

@@ -242,6 +242,7 @@ struct TvDenoiser::System {
   /// 2 α A + r Σ l_e (difference)ᵀ(difference).
   void factorize() {
     std::vector<Eigen::Triplet<double>> entries;
+    entries.reserve(static_cast<std::size_t>(fidelity.size()) + 4 * borders.size());
     for (int k = 0; k < fidelity.size(); ++k) entries.emplace_back(k, k, fidelity[k]);
     for (const Border& b : borders) {
       const double r = kPenalty * b.length;
