@@ -89,7 +89,8 @@ double finish_length(const CamOptions& options, const OpticalSetup& setup) {
   const Eigen::Vector2d size = size_to_cut(options, setup);
   const double pitch = finish_pitch(options, unknown_ground(options, setup));
   const auto rows_of = [&](const Tool& ball, double apart) {
-    return (size + Eigen::Vector2d::Constant(ball.diameter)).prod() / apart;
+    const double beyond = 2.0 * apron_to_cut(options) + ball.diameter;
+    return (size + Eigen::Vector2d::Constant(beyond)).prod() / apart;
   };
   double length = rows_of(finishing_ball(options), pitch) * (finish.cross ? 2.0 : 1.0);
   // The larger ball's remainder is not known yet: at most all of it.
@@ -159,6 +160,7 @@ double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
   plan.optics = setup;
   plan.passes = planned_passes(options, setup);
   plan.polish = options.workshop.polish;
+  plan.apron = apron_to_cut(options);
   return options.tolerances > 0 ? static_cast<double>(part_nodes(plan)) : 0.0;
 }
 

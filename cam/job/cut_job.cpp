@@ -58,18 +58,18 @@ std::unique_ptr<PlannedPart> plan_part(const JobPart& part, const Executor& exec
   return planned;
 }
 
-/// The surfaces of all parts in one mesh, each in its place.
-SurfaceMesh all_surfaces(const CutJob& job) {
+/// The surfaces of all parts, as they are cut, in one mesh, each in its place.
+SurfaceMesh all_surfaces(const CutJob& job, const Parts& parts) {
   SurfaceMesh all;
-  for (const JobPart& part : job.parts) {
-    const SurfaceMesh& mesh = part.lens->surface;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const SurfaceMesh& mesh = parts[k]->setup.mesh();
     const Eigen::Index vertices = all.vertices.cols();
     const Eigen::Index triangles = all.triangles.cols();
     all.vertices.conservativeResize(3, vertices + mesh.vertices.cols());
     all.triangles.conservativeResize(3, triangles + mesh.triangles.cols());
     auto moved = all.vertices.rightCols(mesh.vertices.cols());
     moved = mesh.vertices;
-    moved.topRows<2>().colwise() += part.corner;
+    moved.topRows<2>().colwise() += job.parts[k].corner;
     all.triangles.rightCols(mesh.triangles.cols()) =
         mesh.triangles.array() + static_cast<int>(vertices);
   }
@@ -85,9 +85,9 @@ std::unique_ptr<ProgramChecks> checks_of(const CutJob& job, const Parts& parts) 
   const Eigen::Vector3d& size = job.shared->size;
   const Eigen::AlignedBox3d box(Eigen::Vector3d::Zero(), size);
   const double cell = std::max(kStockCell, size.head<2>().maxCoeff() / kMaxCells);
-  return std::make_unique<ProgramChecks>(std::make_shared<const ProfileCutter>(all_surfaces(job)),
-                                         job.options.workshop, StockMap(box, cell),
-                                         job.shared->z_offset);
+  return std::make_unique<ProgramChecks>(
+      std::make_shared<const ProfileCutter>(all_surfaces(job, parts)), job.options.workshop,
+      StockMap(box, cell), job.shared->z_offset);
 }
 
 WatchedOperation watched(const CutJob& job, const JobPart& part, const PlannedPart& planned,
@@ -96,8 +96,9 @@ WatchedOperation watched(const CutJob& job, const JobPart& part, const PlannedPa
                            descent_rule(job.options.workshop.process, operation.name)};
   if (!job.shared) return watched;
   watched.name += " of " + part.name;
-  const Eigen::Vector2d& size = planned.setup.lens->setup.lens_size;
-  watched.rule.rim = {part.corner, Eigen::Vector2d(part.corner + size)};
+  const Eigen::AlignedBox2d cut = planned.setup.cut_rectangle();
+  watched.rule.rim = {Eigen::Vector2d(cut.min() + part.corner),
+                      Eigen::Vector2d(cut.max() + part.corner)};
   return watched;
 }
 

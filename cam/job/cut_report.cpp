@@ -51,7 +51,7 @@ std::string outline_warning(const WrittenCut& cut) {
   const double usual = Stock{}.allowance;
   return outline_tool_advice(
       cut.setup, cut.checks, cut.setup.blank.max().z(),
-      {"--stock " + trimmed_decimal(usual, 3), cut.setup.field.box.max().z() + usual});
+      {"--stock " + trimmed_decimal(usual, 3), cut.setup.box.max().z() + usual});
 }
 
 /// Depth of a tool in a slot of its own width before a part that does not cut gets into it or
@@ -226,6 +226,7 @@ SetupSheet setup_sheet(const WrittenCut& cut) {
       {"lower left corner of the ", cut.shared ? "blank" : part, ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
   sheet.length_words = length_words_of(options.post, cut.programs);
+  sheet.apron = setup.apron;
   if (lens && designed.setup.front) {
     sheet.front = designed.setup.front;
     sheet.front_words = front_words(setup);

@@ -113,11 +113,6 @@ constexpr double kSameIndex = 0.005;
 
 std::string mm(double value) { return trimmed_decimal(value, 3) + " mm"; }
 
-Eigen::AlignedBox3d box_of(const SurfaceMesh& mesh) {
-  return {Eigen::Vector3d(mesh.vertices.rowwise().minCoeff()),
-          Eigen::Vector3d(mesh.vertices.rowwise().maxCoeff())};
-}
-
 void require_options(const NestOptions& options) {
   const Eigen::Vector2d& blank = options.blank;
   if (!(blank.allFinite() && blank.minCoeff() > 0.0)) {
@@ -156,21 +151,37 @@ void require_alike(const std::vector<NestLens>& lenses) {
   }
 }
 
-double top_of(const NestLens& lens) { return box_of(lens.lens->surface).max().z(); }
+/// What is cut of every lens, box_to_cut().
+using Boxes = std::vector<Eigen::AlignedBox3d>;
 
-const NestLens& highest_of(const std::vector<NestLens>& lenses) {
-  return *std::max_element(lenses.begin(), lenses.end(), [](const NestLens& a, const NestLens& b) {
-    return top_of(a) < top_of(b);
-  });
+Boxes boxes_of(const std::vector<NestLens>& lenses, const CamOptions& options) {
+  Boxes boxes;
+  boxes.reserve(lenses.size());
+  for (const NestLens& one : lenses) boxes.push_back(box_to_cut(*one.lens, options));
+  return boxes;
+}
+
+/// Number of the lens with the highest box.
+std::size_t highest_of(const Boxes& boxes) {
+  const auto lower = [](const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
+    return a.max().z() < b.max().z();
+  };
+  return static_cast<std::size_t>(std::max_element(boxes.begin(), boxes.end(), lower) -
+                                  boxes.begin());
+}
+
+double thickness_for(const Boxes& boxes, const NestOptions& options) {
+  return boxes[highest_of(boxes)].max().z() + options.cam.workshop.stock.allowance;
 }
 
 /// Thickness of the common blank: as given, or what the highest lens needs. @throw InputError
-double thickness_of(const std::vector<NestLens>& lenses, const NestOptions& options) {
-  const double needed = least_thickness(lenses, options);
+double thickness_of(const std::vector<NestLens>& lenses, const Boxes& boxes,
+                    const NestOptions& options) {
+  const double needed = thickness_for(boxes, options);
   const double thickness = options.thickness.value_or(needed);
   if (thickness >= needed) return thickness;
   throw InputError("--blank: a thickness of " + mm(thickness) + " is too little for " +
-                   highest_of(lenses).name + ": must be at least " +
+                   lenses[highest_of(boxes)].name + ": must be at least " +
                    trimmed_decimal(std::ceil(1e3 * needed) / 1e3, 3) + " mm, --stock " +
                    trimmed_decimal(options.cam.workshop.stock.allowance, 3) + " included");
 }
@@ -183,13 +194,17 @@ struct Room {
   double margin = 0.0;  ///< Of each lens's own blank.
 };
 
-Room room_for(const std::vector<NestLens>& lenses, const NestOptions& options, double top) {
+Room room_for(const std::vector<NestLens>& lenses, const Boxes& boxes, const NestOptions& options,
+              double top) {
   const Workshop& workshop = options.cam.workshop;
   const Process& process = workshop.process;
+  const double apron = apron_to_cut(options.cam);
   double reach = 0.0;
   Room room;
+  for (const Eigen::AlignedBox3d& box : boxes) {
+    reach = std::max(reach, apron + rough_reach(workshop, box, top));
+  }
   for (const NestLens& one : lenses) {
-    reach = std::max(reach, rough_reach(workshop, box_of(one.lens->surface), top));
     if (!cuts_outline(options.cam, one.lens->setup)) continue;
     const int number = options.cam.outline_tool > 0 ? options.cam.outline_tool : process.rough.tool;
     room.slot = workshop.tool(number).diameter;
@@ -197,8 +212,8 @@ Room room_for(const std::vector<NestLens>& lenses, const NestOptions& options, d
   const double frame = room.slot > 0.0 ? room.slot + kTabFrame : 0.0;
   const double widest = std::max(workshop.tool(process.rough.tool).diameter,
                                  workshop.tool(process.semi.tool).diameter);
-  room.gap = std::max(reach + process.clearance, room.slot > 0.0 ? frame + room.slot : 0.0);
-  room.edge = std::max(workshop.stock.margin, frame);
+  room.gap = std::max(reach + apron + process.clearance, room.slot > 0.0 ? frame + room.slot : 0.0);
+  room.edge = std::max({workshop.stock.margin, frame, apron});
   // A roughing closer to the edge than its tool's radius removes the rest there.
   room.margin = std::max({room.edge, frame, reach + widest});
   return room;
@@ -213,12 +228,13 @@ double gap_of(const NestOptions& options, const Room& room) {
 }
 
 /// Options of one lens: the workshop with clamps placed relative to that lens, and its own blank.
-CamOptions cut_of(const NestLens& one, const NestOptions& options, const NestedLens& placed,
-                  const Room& room, double top) {
+/// @param allowance  between the highest point that is cut and the blank's top, mm.
+CamOptions cut_of(const NestOptions& options, const NestedLens& placed, const Room& room,
+                  double allowance) {
   CamOptions cut = options.cam;
-  cut.job = one.name;
+  cut.job = placed.name;
   cut.workshop.stock.margin = room.margin;
-  cut.workshop.stock.allowance = top - box_of(one.lens->surface).max().z();
+  cut.workshop.stock.allowance = allowance;
   for (KeepOut& clamp : cut.workshop.keep_outs) {
     clamp.low.head<2>() -= placed.box.min();
     clamp.high.head<2>() -= placed.box.min();
@@ -229,14 +245,15 @@ CamOptions cut_of(const NestLens& one, const NestOptions& options, const NestedL
 }  // namespace
 
 double least_thickness(const std::vector<NestLens>& lenses, const NestOptions& options) {
-  return top_of(highest_of(lenses)) + options.cam.workshop.stock.allowance;
+  return thickness_for(boxes_of(lenses, options.cam), options);
 }
 
 NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& options) {
   require_options(options);
   require_alike(lenses);
-  const double top = thickness_of(lenses, options);
-  const Room room = room_for(lenses, options, top);
+  const Boxes boxes = boxes_of(lenses, options.cam);
+  const double top = thickness_of(lenses, boxes, options);
+  const Room room = room_for(lenses, boxes, options, top);
   NestPlan plan;
   plan.layout.blank = {options.blank.x(), options.blank.y(), top};
   plan.layout.gap = gap_of(options, room);
@@ -244,6 +261,7 @@ NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& optio
   plan.layout.slot = room.slot;
   plan.layout.keep_outs = options.cam.workshop.keep_outs;
   std::vector<NestItem> items;
+  items.reserve(lenses.size());
   for (const NestLens& one : lenses) items.push_back({one.name, one.lens->setup.lens_size});
   const std::vector<Eigen::Vector2d> corners =
       place_in_rows(items, {options.blank, plan.layout.gap, room.edge});
@@ -254,7 +272,7 @@ NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& optio
     placed.outline = edge_of(lenses[k].lens->setup);
     for (Eigen::Vector2d& p : placed.outline) p += corners[k];
     placed.cut_out = cuts_outline(options.cam, lenses[k].lens->setup);
-    plan.cuts.push_back(cut_of(lenses[k], options, placed, room, top));
+    plan.cuts.push_back(cut_of(options, placed, room, top - boxes[k].max().z()));
     validate(plan.cuts.back(), lenses[k].lens->setup);
     plan.layout.lenses.push_back(std::move(placed));
   }
@@ -473,9 +491,8 @@ std::vector<std::string> warnings_of(const std::vector<NestLens>& lenses,
   std::vector<std::string> warnings;
   for (const NestedLens& lens : layout.lenses) {
     if (lens.cut_out) continue;
-    warnings.push_back(lens.name +
-                       ": stays joined to the blank and has to be sawn out; --cut-outline "
-                       "always cuts it out");
+    warnings.emplace_back(joined({lens.name, ": stays joined to the blank and has to be sawn out; ",
+                                  "--cut-outline always cuts it out"}));
   }
   const std::string advice = outline_advice(lenses, options, layout, written);
   if (!advice.empty()) warnings.push_back(advice);
@@ -486,7 +503,7 @@ std::vector<std::string> warnings_of(const std::vector<NestLens>& lenses,
                        decimal_text(travel.z(), 0) + " mm");
   }
   if (!written.others.kept.empty()) {
-    warnings.push_back(
+    warnings.emplace_back(
         "the folder holds programs of another job, which were kept: do not run them with it");
   }
   return warnings;

@@ -14,9 +14,6 @@
 namespace lensforge {
 namespace {
 
-/// A node this far outside of the lens, in spacings, still lies on its rim.
-constexpr double kOnRim = 1e-6;
-
 void check(const char* name, double value, bool fits, const char* rule) {
   if (fits && std::isfinite(value)) return;
   throw InputError(std::string("polish: ") + name + " is " + decimal_text(value, 6) +
@@ -72,29 +69,12 @@ void differentiate(const Values& values, const PolishKernel& kernel, std::int64_
 
 }  // namespace
 
-PolishedField::PolishedField(const SurfaceField& surface, const SurfaceField& form,
-                             const Eigen::AlignedBox2d& lens, const PolishModel& model)
-    : surface_(surface), form_(form), lens_(lens), model_(model) {
+PolishedField::PolishedField(const SurfaceField& surface, const Eigen::AlignedBox2d& lens,
+                             const PolishModel& model)
+    : surface_(surface), lens_(lens), model_(model) {
   check("sigma", model.sigma, model.sigma >= 0.0, "at least 0");
   check("rim_depth", model.rim_depth, model.rim_depth >= 0.0, "at least 0");
   check("rim_length", model.rim_length, model.rim_length > 0.0, "above 0");
-}
-
-PolishedField::Axis PolishedField::make_axis(int axis, const GridWindow& window) const {
-  Axis result;
-  const double spacing = window.spacing[axis];
-  const double origin = window.origin[axis];
-  result.begin = axis == 0 ? window.first_column : window.first_row;
-  result.end = result.begin + (axis == 0 ? window.columns : window.rows);
-  const double low = std::ceil((lens_.min()[axis] - origin) / spacing - kOnRim);
-  const double high = std::floor((lens_.max()[axis] - origin) / spacing + kOnRim);
-  result.rim = std::min(static_cast<std::int64_t>(low), result.begin);
-  result.rim_end = std::max(static_cast<std::int64_t>(high) + 1, result.end);
-  result.kernel = make_kernel(model_.sigma, spacing);
-  const auto reach = static_cast<std::int64_t>(result.kernel.average.size()) - 1;
-  result.sampled = std::max(result.begin - reach - kCreaseHalo, result.rim);
-  result.sampled_end = std::min(result.end + reach + kCreaseHalo, result.rim_end);
-  return result;
 }
 
 void PolishedField::sample(const GridWindow& window, const Executor& executor,
@@ -104,110 +84,50 @@ void PolishedField::sample(const GridWindow& window, const Executor& executor,
     take_off_rim(executor, patch);
     return;
   }
-  const Axis x = make_axis(0, window);
-  const Axis y = make_axis(1, window);
+  const PolishKernel x = make_kernel(model_.sigma, window.spacing.x());
+  const PolishKernel y = make_kernel(model_.sigma, window.spacing.y());
   GridWindow around = window;
-  around.first_column = x.sampled;
-  around.columns = x.sampled_end - x.sampled;
-  around.first_row = y.sampled;
-  around.rows = y.sampled_end - y.sampled;
+  around.first_column -= x.reach() + kCreaseHalo;
+  around.columns += 2 * (x.reach() + kCreaseHalo);
+  around.first_row -= y.reach() + kCreaseHalo;
+  around.rows += 2 * (y.reach() + kCreaseHalo);
   SurfacePatch raw;
   surface_.sample(around, executor, raw);
   correct_crease_sums(executor, raw);
-  SurfacePatch marked;
-  const bool marks = &form_ != &surface_ && (x.turns() || y.turns());
-  if (marks) {
-    form_.sample(around, executor, marked);
-    correct_crease_sums(executor, marked);
-  }
-  const SurfacePatch& form = marks ? marked : raw;
   resize_patch(window, false, patch);
-  Lines lines = along_x(x, y, raw, form, executor);
-  if (y.turns()) {
-    const Lines of_form = marks ? along_x(x, y, form, form, executor) : lines;
-    turn_rows(y, window.columns, of_form.averages, lines.averages);
-    turn_rows(y, window.columns, of_form.slopes, lines.slopes);
-  }
+  const Lines lines = along_x(raw, window, x, y, executor);
   const auto along_y = [&](std::int64_t row) {
     const auto rows_of = [&](const std::vector<double>& from) {
       return [&, row](std::int64_t k) {
-        return &from[index_of((row + y.kernel.reach() + k) * window.columns)];
+        return &from[index_of((row + y.reach() + k) * window.columns)];
       };
     };
     const std::size_t n = index_of(row * window.columns);
-    average(rows_of(lines.averages), y.kernel, window.columns, &patch.z[n]);
-    differentiate(rows_of(lines.averages), y.kernel, window.columns, &patch.slope_y[n]);
-    average(rows_of(lines.slopes), y.kernel, window.columns, &patch.slope_x[n]);
+    average(rows_of(lines.averages), y, window.columns, &patch.z[n]);
+    differentiate(rows_of(lines.averages), y, window.columns, &patch.slope_y[n]);
+    average(rows_of(lines.slopes), y, window.columns, &patch.slope_x[n]);
   };
   parallel_for(executor, "polish along y", window.rows, along_y, 4);
   take_off_rim(executor, patch);
 }
 
-/// Sources of the value of neighbour `at` of an axis beyond the rim: turned about the last node on
-/// the lens.
-PolishedField::Turned PolishedField::Axis::turned(std::int64_t at) const {
-  const std::int64_t last = at < sampled ? sampled : sampled_end - 1;
-  return {last, std::clamp(2 * last - at, sampled, sampled_end - 1)};
-}
-
-bool PolishedField::Axis::turns() const {
-  return begin - kernel.reach() < sampled || end + kernel.reach() > sampled_end;
-}
-
-/// A row's heights from `reach` before the requested nodes to `reach` after them. @param heights,
-/// form  of the sampled nodes.
-std::vector<double> PolishedField::turned_line(const Axis& x, const double* heights,
-                                               const double* form) {
-  std::vector<double> line;
-  line.reserve(index_of(x.end - x.begin + 2 * x.kernel.reach()));
-  for (std::int64_t i = x.begin - x.kernel.reach(); i < x.end + x.kernel.reach(); ++i) {
-    if (i >= x.sampled && i < x.sampled_end) {
-      line.push_back(heights[i - x.sampled]);
-      continue;
-    }
-    const Turned from = x.turned(i);
-    const std::int64_t inside = from.inside - x.sampled;
-    line.push_back(heights[inside] + 2.0 * (form[from.rim - x.sampled] - form[inside]));
-  }
-  return line;
-}
-
 /// Filters every row within the kernel along y.
-PolishedField::Lines PolishedField::along_x(const Axis& x, const Axis& y, const SurfacePatch& raw,
-                                            const SurfacePatch& form, const Executor& executor) {
-  const std::int64_t columns = x.end - x.begin;
-  const std::int64_t sampled = x.sampled_end - x.sampled;
-  const std::int64_t rows = y.end - y.begin + 2 * y.kernel.reach();
-  Lines lines{std::vector<double>(index_of(rows * columns)),
-              std::vector<double>(index_of(rows * columns))};
+PolishedField::Lines PolishedField::along_x(const SurfacePatch& raw, const GridWindow& window,
+                                            const PolishKernel& x, const PolishKernel& y,
+                                            const Executor& executor) {
+  const std::int64_t rows = window.rows + 2 * y.reach();
+  Lines lines{std::vector<double>(index_of(rows * window.columns)),
+              std::vector<double>(index_of(rows * window.columns))};
   const auto along = [&](std::int64_t row) {
-    const std::int64_t to = row + y.sampled - y.begin + y.kernel.reach();
-    if (to < 0 || to >= rows) return;  // In the halo.
-    const std::size_t first = index_of(row * sampled);
-    const std::vector<double> line = turned_line(x, &raw.z[first], &form.z[first]);
-    const auto values = [&](std::int64_t k) { return &line[index_of(x.kernel.reach() + k)]; };
-    average(values, x.kernel, columns, &lines.averages[index_of(to * columns)]);
-    differentiate(values, x.kernel, columns, &lines.slopes[index_of(to * columns)]);
+    const double* const line =
+        &raw.z[index_of((row + kCreaseHalo) * raw.window.columns + kCreaseHalo)];
+    const auto values = [&](std::int64_t k) { return line + x.reach() + k; };
+    const std::size_t n = index_of(row * window.columns);
+    average(values, x, window.columns, &lines.averages[n]);
+    differentiate(values, x, window.columns, &lines.slopes[n]);
   };
-  parallel_for(executor, "polish along x", y.sampled_end - y.sampled, along, 4);
+  parallel_for(executor, "polish along x", rows, along, 4);
   return lines;
-}
-
-/// Fills the rows beyond the rim in the same way. @param values, form  row by row from `reach`
-/// before the requested nodes.
-void PolishedField::turn_rows(const Axis& y, std::int64_t columns, const std::vector<double>& form,
-                              std::vector<double>& values) {
-  const std::int64_t first = y.begin - y.kernel.reach();
-  const auto start_of = [&](std::int64_t j) { return index_of((j - first) * columns); };
-  for (std::int64_t j = first; j < y.end + y.kernel.reach(); ++j) {
-    if (j >= y.sampled && j < y.sampled_end) continue;
-    const Turned from = y.turned(j);
-    const std::size_t inside = start_of(from.inside);
-    const std::size_t rim = start_of(from.rim);
-    for (std::size_t i = 0; i < index_of(columns); ++i) {
-      values[start_of(j) + i] = values[inside + i] + 2.0 * (form[rim + i] - form[inside + i]);
-    }
-  }
 }
 
 void PolishedField::take_off_rim(const Executor& executor, SurfacePatch& patch) const {

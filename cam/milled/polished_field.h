@@ -31,10 +31,8 @@ struct PolishKernel {
 /// heights, by the Gaussian's derivative. This is the linear model of a soft wheel that follows the
 /// form and wears down what is narrower than its contact, σ.
 ///
-/// Beyond the rim the surface is continued: the form is turned about the rim, so that a plane stays
-/// a plane, and the tool's marks are mirrored, z(−t) = z(t) + 2 (form(0) − form(t)). If the marks
-/// were turned as well, those s above the rim on average would be s below it outside: the predicted
-/// leakage of a 25 mm portrait with scallops 0.045 mm apart rose from 0.08 % to 0.44 %.
+/// Beyond the rim the part goes on as it was cut (continued_surface()), and is averaged as it is
+/// there.
 ///
 /// Creases count at their true place between the nodes (correct_crease_sums()). Apart from that the
 /// surface's own slopes are not used: between the passes of a ball they jump by 0.3 rad, and
@@ -49,15 +47,12 @@ class PolishedField final : public SurfaceField {
   /// Radius of the kernel, in σ: 6e-7 of its weight lies beyond.
   static constexpr double kReach = 5.0;
 
-  /// @param surface  the unpolished surface; must outlive the field.
-  /// @param form     the same without the tool's marks; must outlive the field.
+  /// @param surface  the unpolished surface, on the lens and within the kernel's reach and
+  ///                 kCreaseHalo nodes around it; must outlive the field.
   /// @param lens     the lens's rectangle.
   /// @throw InputError naming a number of the model that breaks its rule.
-  PolishedField(const SurfaceField& surface, const SurfaceField& form,
-                const Eigen::AlignedBox2d& lens, const PolishModel& model);
   PolishedField(const SurfaceField& surface, const Eigen::AlignedBox2d& lens,
-                const PolishModel& model)
-      : PolishedField(surface, surface, lens, model) {}
+                const PolishModel& model);
 
   /// The spacing of windows should be at most σ. `cut` is that of the surface if σ is 0, else
   /// empty.
@@ -65,38 +60,17 @@ class PolishedField final : public SurfaceField {
               SurfacePatch& patch) const override;
 
  private:
-  /// A node beyond the rim has twice the value of the rim's node minus that of its mirror image.
-  struct Turned {
-    std::int64_t rim, inside;
-  };
-  /// Nodes of one axis of a window, in the grid: those requested, and those of the lens within
-  /// their kernels, with kCreaseHalo more.
-  struct Axis {
-    std::int64_t begin, end;            ///< Requested.
-    std::int64_t sampled, sampled_end;  ///< Sampled.
-    std::int64_t rim, rim_end;          ///< Of the lens.
-    PolishKernel kernel;
-
-    [[nodiscard]] Turned turned(std::int64_t at) const;
-    /// True if kernels reach over the rim.
-    [[nodiscard]] bool turns() const;
-  };
   /// Averages and slopes along x, row by row from where the kernel along y begins.
   struct Lines {
     std::vector<double> averages;
     std::vector<double> slopes;
   };
 
-  [[nodiscard]] Axis make_axis(int axis, const GridWindow& window) const;
-  static std::vector<double> turned_line(const Axis& x, const double* heights, const double* form);
-  static void turn_rows(const Axis& y, std::int64_t columns, const std::vector<double>& form,
-                        std::vector<double>& values);
-  static Lines along_x(const Axis& x, const Axis& y, const SurfacePatch& raw,
-                       const SurfacePatch& form, const Executor& executor);
+  static Lines along_x(const SurfacePatch& raw, const GridWindow& window, const PolishKernel& x,
+                       const PolishKernel& y, const Executor& executor);
   void take_off_rim(const Executor& executor, SurfacePatch& patch) const;
 
   const SurfaceField& surface_;
-  const SurfaceField& form_;
   Eigen::AlignedBox2d lens_;
   PolishModel model_;
 };

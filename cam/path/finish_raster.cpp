@@ -99,8 +99,8 @@ Eigen::AlignedBox2d axis_box(const RasterPlan& plan, std::int64_t begin, std::in
   Eigen::AlignedBox2d axis;
   for (const std::int64_t row : {begin, begin + count - 1}) {
     const RowSpan span = plan.row_span(row);
-    axis.extend(span.line.at(plan.surface.min()[span.line.along] - plan.reach()));
-    axis.extend(span.line.at(plan.surface.max()[span.line.along] + plan.reach()));
+    axis.extend(span.line.at(plan.finished().min()[span.line.along] - plan.reach()));
+    axis.extend(span.line.at(plan.finished().max()[span.line.along] + plan.reach()));
   }
   return axis;
 }
@@ -144,6 +144,11 @@ int decimals_for(double tolerance, double slope_tolerance) {
   return 6;
 }
 
+Eigen::AlignedBox2d RasterPlan::finished() const {
+  const Eigen::Vector2d apron = Eigen::Vector2d::Constant(options.apron);
+  return {surface.min() - apron, surface.max() + apron};
+}
+
 double RasterPlan::reach() const {
   const double slope = options.rim_slope;
   return radius * slope / std::sqrt(1.0 + slope * slope);
@@ -158,15 +163,16 @@ double RasterPlan::row_place(std::int64_t row) const {
 
 RowSpan RasterPlan::row_span(std::int64_t row) const {
   const int along = options.along;
-  const double low = surface.min()[1 - along];
-  const double high = surface.max()[1 - along];
+  const Eigen::AlignedBox2d all = finished();
+  const double low = all.min()[1 - along];
+  const double high = all.max()[1 - along];
   const double place = row_place(row);
   const double rim = std::clamp(place, low, high);
   const double held = std::clamp(place, low - reach(), high + reach());
   const double remaining =
       std::sqrt(std::max(reach() * reach() - (held - rim) * (held - rim), 0.0));
-  const double begin = surface.min()[along];
-  const double end = surface.max()[along];
+  const double begin = all.min()[along];
+  const double end = all.max()[along];
   return {{along, held},
           to_resolution(begin - radius, options.resolution),
           to_resolution(end + radius, options.resolution),
@@ -224,7 +230,8 @@ RasterPlan plan_finish_raster(const Eigen::AlignedBox2d& surface, double radius,
   const double every = options.every;
   const double steps = every * std::max(1.0, std::ceil(width / (every * options.pitch) - 1e-9));
   plan.pitch = width / steps;
-  plan.rows_outside = static_cast<std::int64_t>(std::ceil(plan.reach() / plan.pitch));
+  const double beyond = options.apron + plan.reach();
+  plan.rows_outside = static_cast<std::int64_t>(std::ceil(beyond / plan.pitch));
   plan.rows = static_cast<std::int64_t>(steps) + 1 + 2 * plan.rows_outside;
   return plan;
 }

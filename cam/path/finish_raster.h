@@ -38,6 +38,7 @@ struct RasterOptions {
   double rim_slope = kSteepestSlope;
   /// The number of rows between the borders of the surface is a multiple of this, ≥ 1.
   int every = 1;
+  double apron = 0.0;  ///< Width of the surface's continuation around it, mm, ≥ 0.
 };
 
 /// Number of decimals, 4 to 6: the smallest whose rounding changes the slope over a kSlopeStretch
@@ -45,16 +46,17 @@ struct RasterOptions {
 /// tolerance.
 int decimals_for(double tolerance, double slope_tolerance);
 
-/// A finishing raster over a rectangle: rows along x (or y), one behind the other along y (x).
+/// A finishing raster over a rectangle and its apron: rows along x (or y), one behind the other
+/// along y (x).
 ///
-/// The rim: a ball that touches a surface falling towards its rim has its centre beyond it, so rows
-/// and the raster extend beyond the rim. Within reach(), R/√2 by default, the ball follows the drop
-/// curve over the rim, which finishes the surface to the rim for slopes up to rim_slope. Beyond,
-/// the tip keeps its height, and rows turn a full radius outside, where the ball no longer touches
-/// the part. On a blank as large as the lens all this is in air; on a larger blank it cuts a
-/// channel one ball wider than the lens and at most 0.3 R below the rim.
+/// The rim of what is finished, the apron's outer one: a ball that touches a surface falling
+/// towards it has its centre beyond it, so rows and the raster extend beyond the rim. Within
+/// reach(), R/√2 by default, the ball follows the drop curve over the rim, which finishes the
+/// surface to the rim for slopes up to rim_slope. Beyond, the tip keeps its height, and rows turn a
+/// full radius outside, where the ball no longer touches the surface. On a blank no larger all this
+/// is in air; on a larger one it cuts a channel one ball wider and at most 0.3 R below the rim.
 struct RasterPlan {
-  Eigen::AlignedBox2d surface;  ///< Rectangle to finish, mm.
+  Eigen::AlignedBox2d surface;  ///< Rectangle to finish, mm, without its apron.
   double radius = 0.0;          ///< Of the ball, mm.
   RasterOptions options;
   double pitch = 0.0;     ///< Stepover as cut: rows lie on both borders of the surface.
@@ -63,7 +65,9 @@ struct RasterPlan {
   /// If given, rows are cut only where the larger ball leaves material; must outlive the plan.
   const RestMap* rest = nullptr;
 
-  /// Distance beyond the rim to which the tip follows the drop curve, mm.
+  /// The surface with its apron.
+  [[nodiscard]] Eigen::AlignedBox2d finished() const;
+  /// Distance beyond the rim of that to which the tip follows the drop curve, mm.
   [[nodiscard]] double reach() const;
   /// y (or x) of a row, mm, rounded to the program's resolution.
   [[nodiscard]] double row_place(std::int64_t row) const;

@@ -97,6 +97,18 @@ void validate_outline(const CamOptions& options) {
   }
 }
 
+/// On a smaller blank the rim would fall off, and polish would take that for the surface.
+void validate_margin(const CamOptions& options) {
+  const double margin = options.workshop.stock.margin;
+  const double needed = apron_to_cut(options);
+  if (margin >= needed) return;
+  refuse(
+      "stock.margin", margin,
+      "is too small for what is cut around the lens so that its rim comes out like the rest, the "
+      "finishing ball's radius and 8 σ of the polish; " +
+          decimal_text(std::ceil(100.0 * needed) / 100.0, 2) + " mm works");
+}
+
 /// A lens with a curved front lies in a nest during the cut, and its blank already has the front.
 void validate_front(const CamOptions& options, const OpticalSetup& setup) {
   if (!setup.front || options.part != PartKind::kLens) return;
@@ -224,6 +236,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_sampling(options);
   validate_tolerances(options);
   validate_tolerances(options, setup);
+  validate_margin(options);
   validate_front(options, setup);
   validate_outline(options);
 }

@@ -11,6 +11,7 @@
 #include "cam/path/pencil.h"
 #include "cam/path/rough.h"
 #include "core/error.h"
+#include "core/lens/continued_surface.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -36,11 +37,17 @@ SurfaceModel model_to_cut(const Lens& lens, const CamOptions& options) {
 }
 
 /// @throw InputError if the surface is below the table, where no tool can cut.
-HeightField above_table(const HeightField& field) {
-  if (field.box.min().z() >= 0.0) return field;
-  throw InputError("surface: reaches " + decimal_text(-field.box.min().z(), 4) +
+void require_above_table(const Eigen::AlignedBox3d& box) {
+  if (box.min().z() >= 0.0) return;
+  throw InputError("surface: reaches " + decimal_text(-box.min().z(), 4) +
                    " mm below the blank's underside, z = 0, where the table is: design with a "
                    "larger --thickness");
+}
+
+Eigen::AlignedBox3d with_heights(Eigen::AlignedBox3d box, const SurfaceMesh& mesh) {
+  box.min().z() = std::min(box.min().z(), mesh.vertices.row(2).minCoeff());
+  box.max().z() = std::max(box.max().z(), mesh.vertices.row(2).maxCoeff());
+  return box;
 }
 
 GcodeMotion moved(GcodeMotion motion, const Eigen::Vector2d& by) {
@@ -70,11 +77,31 @@ CutSetup cut_setup(const Lens& lens, const CamOptions& options) {
   setup.options = options;
   setup.mould_lens = mould_to_cut(lens, options);
   setup.model = model_to_cut(lens, options);
-  setup.field = above_table(inspect_height_field(setup.mesh(), size_to_cut(options, lens.setup)));
-  setup.blank = options.workshop.stock.box(setup.field.box);
+  setup.apron = apron_to_cut(options);
+  const Lens& part = setup.mould_lens ? *setup.mould_lens : lens;
+  setup.field = inspect_height_field(part.surface, size_to_cut(options, lens.setup));
+  const double scale = setup.mould() ? setup.mould()->scale : 1.0;
+  setup.optical =
+      continued_surface(optical_surface(part, setup.model), setup.apron, {scale * RunOut{}.length});
+  setup.box = with_heights(setup.field.box, setup.mesh());
+  require_above_table(setup.box);
+  setup.blank = options.workshop.stock.box(setup.box);
   setup.z_offset = z_offset_of(options.z_zero, setup.field.box.max().z(), setup.blank.max().z());
-  setup.optical = optical_surface(setup.mould_lens ? *setup.mould_lens : lens, setup.model);
   return setup;
+}
+
+Eigen::AlignedBox3d box_to_cut(const Lens& lens, const CamOptions& options) {
+  return cut_setup(lens, options).box;
+}
+
+Eigen::AlignedBox2d CutSetup::cut_rectangle() const {
+  const Eigen::Vector2d around = Eigen::Vector2d::Constant(apron);
+  return {rectangle().min() - around, rectangle().max() + around};
+}
+
+double CutSetup::apron_on_lens() const {
+  const std::optional<CastFrame> frame = mould();
+  return frame ? apron / frame->scale : apron;
 }
 
 std::optional<CastFrame> CutSetup::mould() const {
@@ -112,7 +139,7 @@ CutPasses cut_passes(const CutSetup& setup, const Executor& executor) {
 }
 
 CutRecord::CutRecord(const CutSetup& setup)
-    : stock(whole_blank(setup.options.workshop, setup.field.box)) {}
+    : stock(whole_blank(setup.options.workshop, setup.box)) {}
 
 std::vector<ReportPath> CutRecord::shown_path() const {
   std::vector<ReportPath> paths;
@@ -126,7 +153,7 @@ namespace {
 OperationSummary run_pencil(const CutSetup& setup, const CutPasses& passes, double resolution,
                             const MoveSink& sink, const RunControl& control) {
   const Tool& ball = finishing_ball(setup.options);
-  PencilOptions pencil = pencil_options(setup.options, setup.z_offset, setup.field.box.max().z());
+  PencilOptions pencil = pencil_options(setup.options, setup.z_offset, setup.box.max().z());
   pencil.resolution = resolution;
   return cut_pencil(passes.balls->surface(), find_valleys(setup.mesh(), ball.radius(), pencil),
                     pencil, {"pencil", ball, setup.safe_z(), {}, {}}, sink, control);

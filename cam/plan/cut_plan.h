@@ -32,21 +32,29 @@ struct CutSetup {
   std::shared_ptr<const Lens> mould_lens;      ///< Null if the lens itself is cut.
   SurfaceModel model = SurfaceModel::kSmooth;  ///< Under which the surface is cut.
   HeightField field;                           ///< Size and steepness of the surface to cut.
+  Eigen::AlignedBox3d box;  ///< The surface's from above, its heights with those of its apron.
   Eigen::AlignedBox3d blank;
-  double z_offset = 0.0;                          ///< Program Z − lens-frame z, mm.
-  std::shared_ptr<const OpticalSurface> optical;  ///< The surface behind mesh().
+  double z_offset = 0.0;  ///< Program Z − lens-frame z, mm.
+  double apron = 0.0;     ///< Width of the surface's continuation, mm.
+  /// The surface to cut, the lens's or the mould's, and its continuation around it; mm, in a lens
+  /// frame of its own.
+  std::shared_ptr<const OpticalSurface> optical;
 
-  /// The surface to cut: the lens's or the mould's; mm, in a lens frame of its own.
-  [[nodiscard]] const SurfaceMesh& mesh() const {
-    return mould_lens ? mould_lens->surface : lens->surface;
-  }
+  /// Mesh of the surface to cut.
+  [[nodiscard]] const SurfaceMesh& mesh() const { return optical->mesh(); }
   /// Frame of the lens in the mould, if there is one.
   [[nodiscard]] std::optional<CastFrame> mould() const;
-  /// Rectangle of the surface to cut, seen from above.
+  /// Rectangle of the surface to cut without its apron, seen from above.
   [[nodiscard]] Eigen::AlignedBox2d rectangle() const {
     return {field.box.min().head<2>(), field.box.max().head<2>()};
   }
-  [[nodiscard]] FinishGround ground() const { return {rectangle(), field.steepest, z_offset}; }
+  /// The same with its apron.
+  [[nodiscard]] Eigen::AlignedBox2d cut_rectangle() const;
+  /// Width of the apron on the lens or cast, mm.
+  [[nodiscard]] double apron_on_lens() const;
+  [[nodiscard]] FinishGround ground() const {
+    return {rectangle(), field.steepest, z_offset, apron};
+  }
   /// Stepover of finishing rows, mm.
   [[nodiscard]] double pitch() const { return finish_pitch(options, ground()); }
   /// The finishing rows on the lens.
@@ -57,6 +65,10 @@ struct CutSetup {
   /// Options of the outline cut. @pre cuts_outline().
   [[nodiscard]] OutlineCut outline_cut() const;
 };
+
+/// Box of a lens and of what is cut around it: x and y of the lens, heights with those of the
+/// apron.
+Eigen::AlignedBox3d box_to_cut(const Lens& lens, const CamOptions& options);
 
 /// @param lens  must outlive the setup. @pre validate(options, lens.setup) passed.
 /// @throw InputError naming the surface if it is no height field over the lens's rectangle.

@@ -23,6 +23,10 @@ constexpr double kAboveShortest = 2.0;
 /// the decimals allow lead only to moves of a few micrometres, which turn more.
 constexpr double kGridSlope = 10.0;
 
+/// Width of the apron in σ: the polish's kernel reaches 5, and up to 3 more nodes, which are up to
+/// σ apart, are sampled.
+constexpr double kApronSigmas = 8.0;
+
 RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
   const FinishProcess& finish = options.workshop.process.finish;
   const double radius = finishing_ball(options).radius();
@@ -37,6 +41,7 @@ RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, 
   raster.arcs = options.arcs && options.post.arcs != ArcForm::kNone;
   raster.shortest = shortest_move(options, finishing_ball(options));
   raster.traces = options.render;
+  raster.apron = ground.apron;
   if (larger_ball(options) != nullptr) raster.every = finish.large_every;
   return plan_finish_raster(ground.rectangle, radius, raster);
 }
@@ -50,6 +55,11 @@ const Tool& finishing_ball(const CamOptions& options) {
 const Tool* larger_ball(const CamOptions& options) {
   const int number = options.workshop.process.finish.large_tool;
   return number == 0 ? nullptr : &options.workshop.tool(number);
+}
+
+double apron_to_cut(const CamOptions& options) {
+  const double scale = options.part == PartKind::kMould ? 1.0 / (1.0 - options.shrinkage) : 1.0;
+  return finishing_ball(options).radius() + kApronSigmas * options.workshop.polish.sigma * scale;
 }
 
 int decimals_of(const CamOptions& options) {
@@ -84,7 +94,10 @@ double shortest_move(const CamOptions& options, const Tool& tool) {
 }
 
 FinishGround unknown_ground(const CamOptions& options, const OpticalSetup& setup) {
-  return {{Eigen::Vector2d(0.0, 0.0), size_to_cut(options, setup)}, kUnknownSlope, 0.0};
+  return {{Eigen::Vector2d(0.0, 0.0), size_to_cut(options, setup)},
+          kUnknownSlope,
+          0.0,
+          apron_to_cut(options)};
 }
 
 std::vector<RasterPlan> finish_rasters(const CamOptions& options, const FinishGround& ground) {

@@ -31,6 +31,10 @@ const Tool& finishing_ball(const CamOptions& options);
 /// The larger ball, which finishes all that it can reach; null if the finishing ball works alone.
 const Tool* larger_ball(const CamOptions& options);
 
+/// Width of the continuation that is cut around the surface, mm: the finishing ball's radius and 8
+/// σ of the polish, those of a mould's cast. Nothing beyond has an effect on the light.
+double apron_to_cut(const CamOptions& options);
+
 /// Digits after the point in the programs: as chosen, or as many as the tolerances require.
 int decimals_of(const CamOptions& options);
 
@@ -48,11 +52,12 @@ std::string decimals_warning(const CamOptions& options);
 /// such a limit.
 double shortest_move(const CamOptions& options, const Tool& tool);
 
-/// Extent of the surface to be finished; mm, lens frame.
+/// Extent of the surface to be finished, without its apron; mm, lens frame.
 struct FinishGround {
   Eigen::AlignedBox2d rectangle;  ///< Of the surface to cut.
   double steepest = 0.0;          ///< Rise over run at its steepest place.
   double z_offset = 0.0;          ///< Program Z − lens-frame z.
+  double apron = 0.0;             ///< Width of the continuation cut around it.
 };
 
 /// Stands for the surface as long as it is not known: the lens's rectangle, or the mould's, with

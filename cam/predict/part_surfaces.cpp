@@ -13,6 +13,7 @@
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled/designed_field.h"
 #include "cam/milled/surface_field.h"
+#include "core/lens/continued_surface.h"
 
 namespace lensforge {
 namespace {
@@ -88,8 +89,7 @@ PartSurfaces::PartSurfaces(const Design& design, FinishPaths paths, const Polish
     raw_.push_back(held(on_lens(*stretched_)));
   }
   for (const SurfaceField* field : raw_) {
-    polished_.push_back(
-        std::make_unique<PolishedField>(*field, design.surface, design.rectangle, polish));
+    polished_.push_back(std::make_unique<PolishedField>(*field, design.rectangle, polish));
   }
 }
 
@@ -107,10 +107,13 @@ const SurfaceField* PartSurfaces::held(const SurfaceField* field) {
 CutSurfaces::CutSurfaces(const CutSetup& setup, const CutPasses& passes, FinishPaths paths,
                          const Executor& executor)
     : cut_(meant_surface(setup.optical)),
-      rounded_(cut_->rounded(passes.balls->surface(), setup.rectangle(), executor)) {
+      rounded_(cut_->rounded(passes.balls->surface(), setup.cut_rectangle(), executor)) {
   const Lens& lens = *setup.lens;
   // The mould's surface differs from the surface of the lens cast in it.
-  if (setup.mould()) lens_ = meant_surface(optical_surface(lens, setup.model));
+  if (setup.mould()) {
+    lens_ = meant_surface(
+        continued_surface(optical_surface(lens, setup.model), setup.apron_on_lens(), RunOut{}));
+  }
   const SurfaceField& meant = lens_ ? lens_->field() : cut_->field();
   const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);
   surfaces_.emplace(
@@ -213,6 +216,7 @@ LayeredImage cause_layers(const LeakageResult& leakage, double total) {
   std::vector<const RenderedSurface*> surfaces{&leakage.designed};
   for (const RenderedSurface& step : leakage.steps) surfaces.push_back(&step);
   std::vector<std::string> names;
+  names.reserve(surfaces.size());
   for (const RenderedSurface* surface : surfaces) names.push_back(surface->name);
   const FluxPicture& part = leakage.part().picture;
   LayeredImage layers(part.columns, part.rows, names);

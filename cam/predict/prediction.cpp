@@ -181,11 +181,12 @@ RasterPlan raster_around(const RasterPlan& whole, const Eigen::AlignedBox2d& box
   Eigen::AlignedBox2d part = box;
   const double first = std::floor((box.min()[across] - begin) / whole.pitch);
   const double last = std::ceil((box.max()[across] - begin) / whole.pitch);
-  part.min()[across] = begin + std::max(0.0, first) * whole.pitch;
-  part.max()[across] = std::min(begin + last * whole.pitch, whole.surface.max()[across]);
+  part.min()[across] = begin + first * whole.pitch;
+  part.max()[across] = begin + last * whole.pitch;
   RasterOptions options = whole.options;
   options.pitch = whole.pitch;
   options.every = 1;
+  options.apron = 0.0;
   RasterPlan plan = plan_finish_raster(part, whole.radius, options);
   plan.rest = whole.rest;
   return plan;
@@ -289,7 +290,7 @@ std::vector<BallPath> TrialCut::paths_around(const Eigen::AlignedBox2d& box,
 void TrialCut::add_pencil(const Eigen::AlignedBox2d& box, const MoveSink& sink,
                           const RunControl& control) const {
   const PencilOptions pencil =
-      pencil_options(options_, site_.setup.z_offset, site_.setup.field.box.max().z());
+      pencil_options(options_, site_.setup.z_offset, site_.setup.box.max().z());
   std::vector<Valley> inside;
   for (const Valley& valley :
        find_valleys(site_.setup.mesh(), finishing_ball(options_).radius(), pencil)) {
@@ -320,12 +321,12 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   const Eigen::AlignedBox2d box =
       grown_within(as_written(in_mould(box_of(grid, place.cells), mould), stretch), beyond,
-                   site_.setup.rectangle());
+                   site_.setup.cut_rectangle());
   const MilledField milled(paths_around(box, silent), site_.setup.blank.max().z());
   std::optional<CastField> cast;
   if (mould) cast.emplace(milled, *mould);
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
-  const PolishedField part(raw, site_.designed, {Eigen::Vector2d(0.0, 0.0), optics.lens_size},
+  const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), optics.lens_size},
                            options_.workshop.polish);
   FieldRenderSetup setup{.optics = optics,
                          .grid = grid,
@@ -510,7 +511,8 @@ namespace {
 PartPlan part_plan(const CutSetup& setup) {
   const Workshop& shop = setup.options.workshop;
   return {setup.lens->setup, setup.passes(), shop.polish,
-          shop.polish.sigma * (1.0 + kSigmaBound * shop.tolerances.polish_sigma)};
+          shop.polish.sigma * (1.0 + kSigmaBound * shop.tolerances.polish_sigma),
+          setup.apron_on_lens()};
 }
 
 /// Draws CamOptions::tolerances parts with the workshop's errors and predicts them.
@@ -521,7 +523,7 @@ ToleranceForecast draw_parts(const CutSetup& setup, const PartSurfaces& surfaces
   const CamOptions& options = setup.options;
   const Lens& lens = *setup.lens;
   const PartPlan plan = part_plan(setup);
-  const PartModel model(surfaces.milled(), surfaces.designed(), plan, executor, control);
+  const PartModel model(surfaces.milled(), plan, executor, control);
   const ErrorSource source{options.workshop.tolerances, lens.setup.lens_size, plan.passes,
                            static_cast<std::uint64_t>(options.tolerance_seed)};
   const PictureJudge judge(lens.target, designed, options.leakage);

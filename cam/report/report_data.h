@@ -91,9 +91,10 @@ struct SetupSheet {
   std::string zero_words;                          ///< "top of the blank, lower left corner …"
   std::string up_words;                            ///< The faces that lie up and down.
   std::string length_words;                        ///< Explains how the tools' lengths get into Z.
-  std::optional<Front> front;                      ///< Of the blank, made before the first cut.
-  std::string front_words;                         ///< Explains where it has to lie.
-  std::vector<NamedBox> keep_outs;                 ///< Clamps and other regions closed to tools.
+  double apron = 0.0;               ///< Width of the surface's continuation around the part, mm.
+  std::optional<Front> front;       ///< Of the blank, made before the first cut.
+  std::string front_words;          ///< Explains where it has to lie.
+  std::vector<NamedBox> keep_outs;  ///< Clamps and other regions closed to tools.
 };
 
 /// One program or part of one, for the operator.

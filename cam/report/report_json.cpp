@@ -172,15 +172,11 @@ json setup_json(const SetupSheet& setup) {
   const auto box = [](const NamedBox& item) {
     return json{{"name", item.name}, {"box", box_json(item.box)}};
   };
-  json sheet{{"machine", setup.machine},
-             {"material", setup.material},
-             {"part", box_json(setup.part)},
-             {"blank", box_json(setup.blank)},
-             {"zero", triple(setup.zero)},
-             {"zero_words", setup.zero_words},
-             {"up_words", setup.up_words},
-             {"length_words", setup.length_words},
-             {"keep_outs", list(setup.keep_outs, box)}};
+  json sheet{{"machine", setup.machine},     {"material", setup.material},
+             {"part", box_json(setup.part)}, {"blank", box_json(setup.blank)},
+             {"zero", triple(setup.zero)},   {"zero_words", setup.zero_words},
+             {"up_words", setup.up_words},   {"length_words", setup.length_words},
+             {"apron", setup.apron},         {"keep_outs", list(setup.keep_outs, box)}};
   if (setup.front) {
     sheet["front"] = std::visit([](const auto& front) { return front_json(front); }, *setup.front);
   }

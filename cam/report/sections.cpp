@@ -275,6 +275,11 @@ std::string setup(const ReportData& data) {
       {"Machine", sheet.machine},       {"Blank", box_text(sheet.blank) + ", " + sheet.material},
       {"Part", box_text(sheet.part)},   {"Program zero", sheet.zero_words},
       {"Which way up", sheet.up_words}, {"Tool length", sheet.length_words}};
+  if (sheet.apron > 0.0) {
+    list.push_back({"Rim", joined({"the surface is cut ", decimal_text(sheet.apron, 2),
+                                   " mm beyond the part on every side; ",
+                                   "polish before that is cut or sawn off"})});
+  }
   if (sheet.front) list.push_back({"Front", sheet.front_words});
   if (traits(data.body).reflects && data.part != "mould") {
     list.push_back({"To reflect",

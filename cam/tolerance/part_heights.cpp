@@ -8,6 +8,7 @@
 #include "cam/milled/creases.h"
 #include "cam/milled/surface_field.h"
 #include "core/error.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {
@@ -68,24 +69,27 @@ struct Stretch {
   std::int64_t first, last;
 };
 
-/// Samples of a node's box that lie on the lens.
+/// Samples of a node's box.
 Stretch box_of(const BaseAxis& axis, std::int64_t node) {
-  const std::int64_t count = axis.samples * (axis.nodes - 1);
-  return {std::max<std::int64_t>(0, node * axis.samples - axis.half),
-          std::min(count, node * axis.samples + axis.half) - 1};
+  return {node * axis.samples - axis.half, node * axis.samples + axis.half - 1};
 }
 
-/// Means over the boxes of nodes first … last of a line. `value(s)` is sample s. Marks are mirrored
-/// about the rim, so half a box there has the mean of the whole one; a form is turned about it, so
-/// the mean is the height of the rim, extrapolated from the last two samples.
+/// Mean over the box of a node. `value(s)` is sample s.
 template <class Value>
-double box_mean(const BaseAxis& axis, std::int64_t node, bool form, const Value& value) {
+double box_mean(const BaseAxis& axis, std::int64_t node, const Value& value) {
   const Stretch box = box_of(axis, node);
-  if (form && node == 0) return 1.5 * value(box.first) - 0.5 * value(box.first + 1);
-  if (form && node == axis.nodes - 1) return 1.5 * value(box.last) - 0.5 * value(box.last - 1);
   double sum = 0.0;
   for (std::int64_t s = box.first; s <= box.last; ++s) sum += value(s);
-  return sum / static_cast<double>(box.last - box.first + 1);
+  return sum / static_cast<double>(2 * axis.half);
+}
+
+/// Nodes beyond the rim whose boxes lie on an apron, with the samples that creases need.
+std::int64_t nodes_beyond(const BaseAxis& axis, double apron) {
+  const double sample = axis.spacing / static_cast<double>(axis.samples);
+  const double halo = static_cast<double>(kCreaseHalo) * sample;
+  const double room = (apron - 0.5 * axis.box() - halo) / axis.spacing;
+  LF_CHECK(room >= 0.0, number_text(apron));
+  return static_cast<std::int64_t>(room);
 }
 
 /// A tile of nodes and the samples of its boxes.
@@ -96,20 +100,20 @@ class BoxTile {
     const auto stretch = [](const BaseAxis& axis, std::int64_t first, std::int64_t count) {
       return Stretch{box_of(axis, first).first, box_of(axis, first + count - 1).last};
     };
-    const auto take = [](Stretch s, std::int64_t all, std::int64_t& first, std::int64_t& count) {
-      first = std::max<std::int64_t>(0, s.first - kCreaseHalo);
-      count = std::min(all, s.last + 1 + kCreaseHalo) - first;
+    const auto take = [](Stretch s, std::int64_t& first, std::int64_t& count) {
+      first = s.first - kCreaseHalo;
+      count = s.last + 1 + kCreaseHalo - first;
     };
-    take(stretch(axes[0], nodes.column, nodes.columns), window_.columns, window_.first_column,
-         window_.columns);
-    take(stretch(axes[1], nodes.row, nodes.rows), window_.rows, window_.first_row, window_.rows);
+    take(stretch(axes[0], nodes.column, nodes.columns), window_.first_column, window_.columns);
+    take(stretch(axes[1], nodes.row, nodes.rows), window_.first_row, window_.rows);
   }
 
   [[nodiscard]] const GridWindow& window() const { return window_; }
 
-  /// Writes the nodes' means into a grid of all nodes.
-  void average(const std::vector<double>& samples, bool form, const Executor& executor,
-               std::vector<double>& grid) const {
+  /// Writes the nodes' means to where `node(i, j)` of the grid is.
+  template <class Node>
+  void average(const std::vector<double>& samples, const Executor& executor,
+               const Node& node) const {
     std::vector<double> lines(static_cast<std::size_t>(window_.rows * nodes_.columns));
     const auto along_x = [&](std::int64_t row) {
       const auto value = [&](std::int64_t s) {
@@ -117,7 +121,7 @@ class BoxTile {
       };
       for (std::int64_t i = 0; i < nodes_.columns; ++i) {
         lines[static_cast<std::size_t>(row * nodes_.columns + i)] =
-            box_mean(axes_[0], nodes_.column + i, form, value);
+            box_mean(axes_[0], nodes_.column + i, value);
       }
     };
     parallel_for(executor, "boxes along x", window_.rows, along_x, 8);
@@ -126,8 +130,7 @@ class BoxTile {
         const auto value = [&](std::int64_t s) {
           return lines[static_cast<std::size_t>((s - window_.first_row) * nodes_.columns + i)];
         };
-        grid[static_cast<std::size_t>((nodes_.row + row) * axes_[0].nodes + nodes_.column + i)] =
-            box_mean(axes_[1], nodes_.row + row, form, value);
+        *node(nodes_.column + i, nodes_.row + row) = box_mean(axes_[1], nodes_.row + row, value);
       }
     };
     parallel_for(executor, "boxes along y", nodes_.rows, along_y, 8);
@@ -139,21 +142,21 @@ class BoxTile {
   GridWindow window_;
 };
 
-/// Nodes that define one beyond the rim: the rim's, and its mirror image inside. A node of the lens
-/// is its own.
-struct Turned {
-  std::int64_t rim, inside;
-};
-
-Turned turned(std::int64_t at, std::int64_t nodes) {
-  const std::int64_t rim = std::clamp<std::int64_t>(at, 0, nodes - 1);
-  return {rim, std::clamp<std::int64_t>(2 * rim - at, 0, nodes - 1)};
+/// @param nodes  along either axis, from the first one beyond the rim.
+std::vector<CellRange> node_tiles(const std::array<BaseAxis, 2>& axes, const CellRange& nodes) {
+  const std::int64_t samples = std::max(axes[0].samples, axes[1].samples);
+  return tiles_of(nodes, std::max<std::int64_t>(16, kTile / samples));
 }
 
-std::vector<CellRange> node_tiles(const std::array<BaseAxis, 2>& axes) {
-  const std::int64_t samples = std::max(axes[0].samples, axes[1].samples);
-  return tiles_of({0, 0, axes[0].nodes, axes[1].nodes},
-                  std::max<std::int64_t>(16, kTile / samples));
+/// The nearest of the nodes −beyond … nodes + beyond − 1, and the mirror image in it: a node of
+/// these is its own.
+struct Turned {
+  std::int64_t edge, inside;
+};
+
+Turned turned(std::int64_t at, std::int64_t nodes, std::int64_t beyond) {
+  const std::int64_t edge = std::clamp<std::int64_t>(at, -beyond, nodes - 1 + beyond);
+  return {edge, 2 * edge - at};
 }
 
 }  // namespace
@@ -171,51 +174,45 @@ std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& pas
 }
 
 BaseHeights::BaseHeights(const std::array<BaseAxis, 2>& axes, std::int64_t pad)
-    : axes_(axes), pad_(pad) {}
+    : axes_(axes), pad_(pad) {
+  heights_.resize(static_cast<std::size_t>(stride() * (axes_[1].nodes + 2 * pad_)));
+}
 
-BaseHeights BaseHeights::sample(const SurfaceField& cut, const SurfaceField& designed,
+BaseHeights BaseHeights::sample(const SurfaceField& cut, double apron,
                                 const std::array<BaseAxis, 2>& axes, std::int64_t pad,
                                 const Executor& executor, const RunControl& control) {
-  const auto count = static_cast<std::size_t>(axes[0].nodes * axes[1].nodes);
-  std::vector<double> form(count);
-  std::vector<double> marks(count);
-  const std::vector<CellRange> tiles = node_tiles(axes);
-  SurfacePatch meant;
-  SurfacePatch left;
+  BaseHeights base(axes, pad);
+  const std::int64_t columns = std::min(pad, nodes_beyond(axes[0], apron));
+  const std::int64_t rows = std::min(pad, nodes_beyond(axes[1], apron));
+  const std::vector<CellRange> tiles =
+      node_tiles(axes, {-columns, -rows, axes[0].nodes + 2 * columns, axes[1].nodes + 2 * rows});
+  const auto node = [&](std::int64_t i, std::int64_t j) { return base.place(i, j); };
+  SurfacePatch patch;
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     if (control.stop_requested()) throw Interrupted();
     const BoxTile tile(axes, tiles[t]);
-    designed.sample(tile.window(), executor, meant);
-    cut.sample(tile.window(), executor, left);
-    correct_crease_sums(executor, meant);
-    correct_crease_sums(executor, left);
-    for (std::size_t n = 0; n < left.z.size(); ++n) left.z[n] -= meant.z[n];
-    tile.average(meant.z, true, executor, form);
-    tile.average(left.z, false, executor, marks);
+    cut.sample(tile.window(), executor, patch);
+    correct_crease_sums(executor, patch);
+    tile.average(patch.z, executor, node);
     control.report({"tolerances: the part as cut", static_cast<double>(t + 1),
                     static_cast<double>(tiles.size()), "tiles"});
   }
-  BaseHeights base(axes, pad);
-  base.extend(form, marks);
+  base.extend(columns, rows);
   return base;
 }
 
-void BaseHeights::extend(const std::vector<double>& form, const std::vector<double>& marks) {
-  const std::int64_t columns = axes_[0].nodes;
-  const std::int64_t rows = axes_[1].nodes;
-  heights_.resize(static_cast<std::size_t>(stride() * (rows + 2 * pad_)));
-  std::size_t n = 0;
-  for (std::int64_t j = -pad_; j < rows + pad_; ++j) {
-    const Turned y = turned(j, rows);
-    for (std::int64_t i = -pad_; i < columns + pad_; ++i) {
-      const Turned x = turned(i, columns);
-      // Turned along x on the rows concerned, then along y.
-      const auto along = [&](std::int64_t row) {
-        const double* const line = &form[static_cast<std::size_t>(row * columns)];
-        return x.inside == i ? line[i] : 2.0 * line[x.rim] - line[x.inside];
-      };
-      const double height = y.inside == j ? along(j) : 2.0 * along(y.rim) - along(y.inside);
-      heights_[n++] = height + marks[static_cast<std::size_t>(y.inside * columns + x.inside)];
+void BaseHeights::extend(std::int64_t columns, std::int64_t rows) {
+  for (std::int64_t j = -rows; j < axes_[1].nodes + rows; ++j) {
+    for (std::int64_t i = -pad_; i < axes_[0].nodes + pad_; ++i) {
+      const Turned x = turned(i, axes_[0].nodes, columns);
+      if (x.edge != i) *place(i, j) = 2.0 * *at(x.edge, j) - *at(x.inside, j);
+    }
+  }
+  for (std::int64_t j = -pad_; j < axes_[1].nodes + pad_; ++j) {
+    const Turned y = turned(j, axes_[1].nodes, rows);
+    if (y.edge == j) continue;
+    for (std::int64_t i = -pad_; i < axes_[0].nodes + pad_; ++i) {
+      *place(i, j) = 2.0 * *at(i, y.edge) - *at(i, y.inside);
     }
   }
 }

@@ -35,15 +35,15 @@ std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& pas
                                   const Eigen::Vector2d& detail);
 
 /// The surface as cut, before polishing, at the nodes of a grid over the lens and `pad` nodes
-/// beyond its rim: means of its heights over boxes around the nodes (BaseAxis). Beyond the rim it
-/// is continued as in PolishedField: the form is turned about the rim, the tool's marks are
-/// mirrored.
+/// beyond its rim: means of its heights over boxes around the nodes (BaseAxis). Nodes beyond the
+/// apron, of which polish leaves less than a thousandth on the lens, are turned about its edge.
 class BaseHeights {
  public:
   /// Samples the whole lens once, a sixth of a pitch apart across the rows.
-  /// @param cut, designed  of one lens, as in PolishedField.
+  /// @param apron  distance beyond the lens's rim up to which the surface is cut, mm: at least half
+  ///               a box and kCreaseHalo samples.
   /// @throw Interrupted
-  static BaseHeights sample(const SurfaceField& cut, const SurfaceField& designed,
+  static BaseHeights sample(const SurfaceField& cut, double apron,
                             const std::array<BaseAxis, 2>& axes, std::int64_t pad,
                             const Executor& executor, const RunControl& control);
 
@@ -58,7 +58,11 @@ class BaseHeights {
 
  private:
   BaseHeights(const std::array<BaseAxis, 2>& axes, std::int64_t pad);
-  void extend(const std::vector<double>& form, const std::vector<double>& marks);
+  /// Fills the nodes more than so many beyond the rim.
+  void extend(std::int64_t columns, std::int64_t rows);
+  [[nodiscard]] double* place(std::int64_t i, std::int64_t j) {
+    return &heights_[static_cast<std::size_t>((j + pad_) * stride() + i + pad_)];
+  }
 
   std::array<BaseAxis, 2> axes_;
   std::int64_t pad_;

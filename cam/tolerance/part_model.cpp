@@ -588,10 +588,10 @@ Eigen::Vector2d blur_radii(const PartScene& scene, const Eigen::Vector2d& scale,
 
 }  // namespace
 
-PartModel::PartModel(const SurfaceField& cut, const SurfaceField& designed, const PartPlan& plan,
-                     const Executor& executor, const RunControl& control)
+PartModel::PartModel(const SurfaceField& cut, const PartPlan& plan, const Executor& executor,
+                     const RunControl& control)
     : plan_(plan),
-      base_(BaseHeights::sample(cut, designed, axes_of(plan),
+      base_(BaseHeights::sample(cut, plan.apron, axes_of(plan),
                                 pad_of(axes_of(plan), plan.largest_sigma), executor, control)),
       mean_height_(mean_height(base_)),
       lit_(light_nodes(base_)) {}

@@ -86,6 +86,7 @@ struct PartPlan {
   Passes passes;
   PolishModel polish;
   double largest_sigma = 0.0;  ///< Of the polish, with errors, mm, ≥ polish.sigma.
+  double apron = 0.0;  ///< Distance beyond the lens's rim up to which the surface is cut, mm.
 };
 
 /// Predicts the pictures of many parts with errors from one sampling of the surface as cut.
@@ -96,10 +97,10 @@ struct PartPlan {
 /// of surfaces.
 class PartModel {
  public:
-  /// @param cut, designed  as in BaseHeights::sample(); used only during construction.
+  /// @param cut  as in BaseHeights::sample(); used only during construction.
   /// @throw Interrupted
-  PartModel(const SurfaceField& cut, const SurfaceField& designed, const PartPlan& plan,
-            const Executor& executor, const RunControl& control);
+  PartModel(const SurfaceField& cut, const PartPlan& plan, const Executor& executor,
+            const RunControl& control);
 
   /// The picture of one part; same bits for any number of threads. @throw Interrupted
   [[nodiscard]] FluxPicture render(const PartError& error, const Executor& executor) const;

@@ -105,7 +105,9 @@ void describe(Description& d, Material& material) {
 }
 
 void describe(Description& d, Stock& stock) {
-  d.length("margin", stock.margin, {0.0, kBlank}, "mm beyond the lens's rectangle on every side");
+  d.length("margin", stock.margin, {0.0, kBlank},
+           "mm beyond the lens's rectangle on every side, at least a finishing ball's radius and 8 "
+           "sigma");
   d.length("allowance", stock.allowance, {0.0, kBlank}, "mm above the surface's highest point");
 }
 

@@ -68,6 +68,20 @@ SmoothPatch::SmoothPatch(const std::array<Eigen::Vector2d, 3>& corners,
             csss * b * b * b + csst * b * b * e + cstt * b * e * e + cttt * e * e * e};
 }
 
+SmoothPatch cubic_through(const std::array<Eigen::Vector2d, 3>& corners,
+                          const std::array<SurfacePoint, 3>& points, double middle) {
+  const auto toward = [&](std::size_t i, std::size_t j) {
+    return points[i].z + points[i].slope.dot(corners[j] - corners[i]) / 3.0;
+  };
+  SmoothPatch::Coefficients c{points[0].z,  points[1].z,  points[2].z, toward(0, 1), toward(1, 0),
+                              toward(0, 2), toward(1, 2), 0.0,         toward(2, 0), toward(2, 1)};
+  // In the middle a corner weighs 1/27, a coefficient on an edge 3/27, the inner one 6/27.
+  const double at_corners = c[0] + c[1] + c[2];
+  const double on_edges = c[3] + c[4] + c[5] + c[6] + c[8] + c[9];
+  c[7] = (27.0 * middle - at_corners - 3.0 * on_edges) / 6.0;
+  return {corners, c};
+}
+
 SurfaceShape SmoothPatch::at(const Eigen::Vector2d& xy) const {
   const double x = xy.x() - origin_.x();
   const double y = xy.y() - origin_.y();
@@ -206,16 +220,12 @@ SmoothPatch FacetSurface::patch_in(std::int64_t triangle,
            mean(1, 1, 1), mean(1, 0, 2), mean(0, 1, 2)}};
 }
 
-namespace {
-
-void widen(BendRange& range, const Eigen::Matrix2d& bend) {
+void BendRange::include(const Eigen::Matrix2d& bend) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(bend, Eigen::EigenvaluesOnly);
-  range.least = std::min(range.least, solver.eigenvalues()[0]);
-  range.largest = std::max(range.largest, solver.eigenvalues()[1]);
+  least = std::min(least, solver.eigenvalues()[0]);
+  largest = std::max(largest, solver.eigenvalues()[1]);
 }
-
-}  // namespace
 
 SplineSurface::SplineSurface(ControlNet net)
     : OpticalSurface(spline_nodes(net, kMeshSamples).mesh), net_(std::move(net)) {}
@@ -244,31 +254,22 @@ SurfacePoint SplineSurface::in_triangle(std::int64_t triangle,
 SmoothPatch SplineSurface::patch_in(std::int64_t triangle,
                                     const Eigen::Vector3d& /*weights*/) const {
   std::array<Eigen::Vector2d, 3> p;
-  std::array<SurfaceShape, 3> s;
+  std::array<SurfacePoint, 3> points;
   for (int k = 0; k < 3; ++k) {
     const auto i = static_cast<std::size_t>(k);
     p[i] = mesh().corner(triangle, k).head<2>();
-    s[i] = net_.at(node_parameters(mesh().triangles(k, triangle))).shape();
+    const SurfaceShape shape = net_.at(node_parameters(mesh().triangles(k, triangle))).shape();
+    points[i] = {shape.z, shape.slope};
   }
-  const auto toward = [&](std::size_t i, std::size_t j) {
-    return s[i].z + s[i].slope.dot(p[j] - p[i]) / 3.0;
-  };
-  SmoothPatch::Coefficients c{s[0].z,       s[1].z,       s[2].z, toward(0, 1), toward(1, 0),
-                              toward(0, 2), toward(1, 2), 0.0,    toward(2, 0), toward(2, 1)};
-  // In the middle a corner weighs 1/27, a coefficient on an edge 3/27, the inner one 6/27.
-  const double middle = shape_in(triangle, Eigen::Vector3d::Constant(1.0 / 3.0)).z;
-  const double corners = c[0] + c[1] + c[2];
-  const double edges = c[3] + c[4] + c[5] + c[6] + c[8] + c[9];
-  c[7] = (27.0 * middle - corners - 3.0 * edges) / 6.0;
-  return {p, c};
+  return cubic_through(p, points, shape_in(triangle, Eigen::Vector3d::Constant(1.0 / 3.0)).z);
 }
 
 BendRange SplineSurface::bend_range(std::int64_t triangle) const {
   const SmoothPatch patch = patch_in(triangle, Eigen::Vector3d::Constant(1.0 / 3.0));
   BendRange range{HUGE_VAL, -HUGE_VAL};
   for (int k = 0; k < 3; ++k) {
-    widen(range, patch.at(mesh().corner(triangle, k).head<2>()).bend);
-    widen(range, net_.at(node_parameters(mesh().triangles(k, triangle))).shape().bend);
+    range.include(patch.at(mesh().corner(triangle, k).head<2>()).bend);
+    range.include(net_.at(node_parameters(mesh().triangles(k, triangle))).shape().bend);
   }
   return range;
 }

@@ -16,6 +16,12 @@
 
 namespace lensforge {
 
+/// Height and slopes of a surface above a point.
+struct SurfacePoint {
+  double z = 0.0;                                   ///< mm
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< ∂z/∂x, ∂z/∂y
+};
+
 /// A cubic height over a triangle seen from above.
 class SmoothPatch {
  public:
@@ -56,6 +62,10 @@ struct PlaceOnMesh {
   std::int64_t triangle = -1;
   Eigen::Vector3d weights = Eigen::Vector3d::Zero();  ///< Barycentric.
 };
+
+/// The cubic with these heights and slopes at a triangle's corners and this height in its middle.
+SmoothPatch cubic_through(const std::array<Eigen::Vector2d, 3>& corners,
+                          const std::array<SurfacePoint, 3>& points, double middle);
 
 /// Finds the triangle of a height field above or below a point.
 class TriangleIndex {
@@ -117,12 +127,6 @@ inline std::vector<std::pair<std::string, SurfaceModel>> named_models() {
   return named(kSurfaceModels);
 }
 
-/// Height and slopes of a surface above a point.
-struct SurfacePoint {
-  double z = 0.0;                                   ///< mm
-  Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< ∂z/∂x, ∂z/∂y
-};
-
 /// The nearest point of a box: rounding may put points of the rim outside.
 inline Eigen::Vector2d nearest_inside(const Eigen::AlignedBox2d& box, const Eigen::Vector2d& at) {
   return at.cwiseMax(box.min()).cwiseMin(box.max());
@@ -132,6 +136,9 @@ inline Eigen::Vector2d nearest_inside(const Eigen::AlignedBox2d& box, const Eige
 struct BendRange {
   double least = 0.0;
   double largest = 0.0;
+
+  /// Widens the range to the eigenvalues of second derivatives.
+  void include(const Eigen::Matrix2d& bend);
 };
 
 /// A lens's optical surface under one of the models: a height field over the triangles of a mesh.
@@ -156,6 +163,12 @@ class OpticalSurface {
   [[nodiscard]] virtual bool has_thirds() const { return false; }
   /// Curvature bounds over a triangle, its border included.
   [[nodiscard]] virtual BendRange bend_range(std::int64_t triangle) const = 0;
+  /// Like in_triangle(), with second derivatives where these are continuous; else they are 0.
+  [[nodiscard]] virtual SurfaceShape shape_in(std::int64_t triangle,
+                                              const Eigen::Vector3d& weights) const {
+    const SurfacePoint point = in_triangle(triangle, weights);
+    return {point.z, point.slope, Eigen::Matrix2d::Zero()};
+  }
 
   /// The point above xy; nothing outside the mesh.
   [[nodiscard]] std::optional<SurfacePoint> at(const Eigen::Vector2d& xy) const;
@@ -217,8 +230,8 @@ class SplineSurface final : public OpticalSurface {
 
   [[nodiscard]] const ControlNet& net() const { return net_; }
 
-  /// Height, slopes and second derivatives at a point of a triangle.
-  [[nodiscard]] SurfaceShape shape_in(std::int64_t triangle, const Eigen::Vector3d& weights) const;
+  [[nodiscard]] SurfaceShape shape_in(std::int64_t triangle,
+                                      const Eigen::Vector3d& weights) const override;
 
  private:
   [[nodiscard]] Eigen::Vector2d node_parameters(int node) const;

@@ -237,10 +237,8 @@ PatchCorners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slope
 
 }  // namespace
 
-SmoothSurface::SmoothSurface(const SurfaceMesh& mesh) : SmoothSurface(mesh, vertex_slopes(mesh)) {}
-
-SmoothSurface::SmoothSurface(const SurfaceMesh& mesh, Eigen::Matrix2Xd slopes)
-    : OpticalSurface(with_heights_of(mesh, slopes)), slopes_(std::move(slopes)) {}
+SmoothSurface::SmoothSurface(const SurfaceMesh& mesh)
+    : SmoothSurface(with_heights_of(mesh, vertex_slopes(mesh)), vertex_slopes(mesh)) {}
 
 SurfacePoint SmoothSurface::in_triangle(std::int64_t triangle,
                                         const Eigen::Vector3d& weights) const {

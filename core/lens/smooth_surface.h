@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "core/lens/optical_surface.h"
 #include "core/mesh/surface_mesh.h"
@@ -27,6 +28,9 @@ class SmoothSurface final : public OpticalSurface {
  public:
   /// @pre every triangle faces +z (height_field_fault()).
   explicit SmoothSurface(const SurfaceMesh& mesh);
+  /// Through the mesh's vertices as they are, with these slopes there, 2 × V. @pre as above.
+  SmoothSurface(SurfaceMesh mesh, Eigen::Matrix2Xd slopes)
+      : OpticalSurface(std::move(mesh)), slopes_(std::move(slopes)) {}
 
   [[nodiscard]] bool has_creases() const override { return false; }
   [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
@@ -49,8 +53,6 @@ class SmoothSurface final : public OpticalSurface {
   [[nodiscard]] const Eigen::Matrix2Xd& slopes() const { return slopes_; }
 
  private:
-  SmoothSurface(const SurfaceMesh& mesh, Eigen::Matrix2Xd slopes);
-
   Eigen::Matrix2Xd slopes_;
 };
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <utility>
 
+#include "core/lens/continued_surface.h"
 #include "core/spline/cubic_spline.h"
 
 namespace lensforge {
@@ -68,33 +69,62 @@ Eigen::MatrixXd AveragingGrid::make_heights() const {
   return Eigen::MatrixXd::Zero(cells_.x() + 1 + 2 * kReach, cells_.y() + 1 + 2 * kReach);
 }
 
-void AveragingGrid::turn_about_rim(Eigen::MatrixXd& heights) {
+/// f(−t) = f − t f′ + height(t) f″ with one-sided differences.
+AveragingGrid::RimWeights AveragingGrid::rim_weights(int axis) const {
+  const Eigen::Vector4d slope = Eigen::Vector4d(-11.0, 18.0, -9.0, 2.0) / 6.0;
+  const Eigen::Vector4d bend(2.0, -5.0, 4.0, -1.0);
+  const double step = step_[axis];
+  RimWeights weights;
+  for (int k = 1; k <= kReach; ++k) {
+    weights[static_cast<std::size_t>(k - 1)] =
+        Eigen::Vector4d::Unit(0) - k * slope + RunOut{}.height(k * step) / (step * step) * bend;
+  }
+  return weights;
+}
+
+void AveragingGrid::continue_beyond_rim(Eigen::MatrixXd& heights) const {
   const Eigen::Index right = heights.rows() - 1 - kReach;
   const Eigen::Index top = heights.cols() - 1 - kReach;
+  const RimWeights along_x = rim_weights(0);
+  const RimWeights along_y = rim_weights(1);
   for (Eigen::Index k = 1; k <= kReach; ++k) {
-    heights.row(kReach - k) = 2.0 * heights.row(kReach) - heights.row(kReach + k);
-    heights.row(right + k) = 2.0 * heights.row(right) - heights.row(right - k);
+    const Eigen::Vector4d& w = along_x[static_cast<std::size_t>(k - 1)];
+    heights.row(kReach - k).setZero();
+    heights.row(right + k).setZero();
+    for (Eigen::Index j = 0; j < w.size(); ++j) {
+      heights.row(kReach - k) += w[j] * heights.row(kReach + j);
+      heights.row(right + k) += w[j] * heights.row(right - j);
+    }
   }
   for (Eigen::Index k = 1; k <= kReach; ++k) {
-    heights.col(kReach - k) = 2.0 * heights.col(kReach) - heights.col(kReach + k);
-    heights.col(top + k) = 2.0 * heights.col(top) - heights.col(top - k);
+    const Eigen::Vector4d& w = along_y[static_cast<std::size_t>(k - 1)];
+    heights.col(kReach - k).setZero();
+    heights.col(top + k).setZero();
+    for (Eigen::Index j = 0; j < w.size(); ++j) {
+      heights.col(kReach - k) += w[j] * heights.col(kReach + j);
+      heights.col(top + k) += w[j] * heights.col(top - j);
+    }
   }
 }
 
-void AveragingGrid::turn_about_rim_adjoint(Eigen::MatrixXd& heights_bar) {
+void AveragingGrid::continue_beyond_rim_adjoint(Eigen::MatrixXd& heights_bar) const {
   const Eigen::Index right = heights_bar.rows() - 1 - kReach;
   const Eigen::Index top = heights_bar.cols() - 1 - kReach;
+  const RimWeights along_x = rim_weights(0);
+  const RimWeights along_y = rim_weights(1);
   for (Eigen::Index k = 1; k <= kReach; ++k) {
-    heights_bar.col(kReach) += 2.0 * heights_bar.col(kReach - k);
-    heights_bar.col(kReach + k) -= heights_bar.col(kReach - k);
-    heights_bar.col(top) += 2.0 * heights_bar.col(top + k);
-    heights_bar.col(top - k) -= heights_bar.col(top + k);
+    const Eigen::Vector4d& w = along_y[static_cast<std::size_t>(k - 1)];
+    for (Eigen::Index j = 0; j < w.size(); ++j) {
+      heights_bar.col(kReach + j) += w[j] * heights_bar.col(kReach - k);
+      heights_bar.col(top - j) += w[j] * heights_bar.col(top + k);
+    }
   }
   for (Eigen::Index k = 1; k <= kReach; ++k) {
-    heights_bar.row(kReach) += 2.0 * heights_bar.row(kReach - k);
-    heights_bar.row(kReach + k) -= heights_bar.row(kReach - k);
-    heights_bar.row(right) += 2.0 * heights_bar.row(right + k);
-    heights_bar.row(right - k) -= heights_bar.row(right + k);
+    const Eigen::Vector4d& w = along_x[static_cast<std::size_t>(k - 1)];
+    for (Eigen::Index j = 0; j < w.size(); ++j) {
+      heights_bar.row(kReach + j) += w[j] * heights_bar.row(kReach - k);
+      heights_bar.row(right - j) += w[j] * heights_bar.row(right + k);
+    }
   }
 }
 
@@ -138,7 +168,7 @@ MadeSurface::MadeSurface(const ControlNet& net, const MadeBy& made, const Execut
       heights_(grid_.make_heights()) {
   const auto sample = [&](std::int64_t row) { sample_row(net, static_cast<int>(row)); };
   parallel_for(executor, "heights to polish", grid_.cells().y() + 1, sample, 1);
-  AveragingGrid::turn_about_rim(heights_);
+  grid_.continue_beyond_rim(heights_);
 }
 
 /// Newton's method from the last sample, and a Taylor expansion over its remaining error.
@@ -290,7 +320,7 @@ void MadeNodes::look(const double* points, double* positions, double* normals) {
   parallel_for(
       executor_, "heights to polish", grid_.cells().y() + 1,
       [&](std::int64_t row) { sample_row(static_cast<int>(row)); }, 1);
-  AveragingGrid::turn_about_rim(heights_);
+  grid_.continue_beyond_rim(heights_);
   known_ = true;
   plan_.look(points, positions, normals);
   parallel_for(executor_, "made nodes", static_cast<std::int64_t>(nodes_.size()),
@@ -361,7 +391,7 @@ void MadeNodes::average(std::int64_t i, double* positions, double* normals) {
 void MadeNodes::look_adjoint(const double* position_bar, const double* normal_bar,
                              double* points_bar) {
   spread_nodes(position_bar, normal_bar);
-  AveragingGrid::turn_about_rim_adjoint(heights_bar_);
+  grid_.continue_beyond_rim_adjoint(heights_bar_);
   plan_.look_adjoint(plan_bar_.data(), no_bar_.data(), points_bar);
   spread_samples(points_bar);
 }

@@ -53,11 +53,12 @@ class AveragingGrid {
 
   /// Heights of all samples: sample (i, j) of the lens is at (i + kReach, j + kReach).
   [[nodiscard]] Eigen::MatrixXd make_heights() const;
-  /// Fills the samples beyond the rim, where the surface continues point-symmetrically: f(−x) = 2
-  /// f(0) − f(x).
-  static void turn_about_rim(Eigen::MatrixXd& heights);
-  /// Adjoint of turn_about_rim(); leaves the derivatives by the samples beyond the rim unchanged.
-  static void turn_about_rim_adjoint(Eigen::MatrixXd& heights_bar);
+  /// Fills the samples beyond the rim as continued_surface() does; slopes and curvatures at the rim
+  /// are those of the cubic through four samples.
+  void continue_beyond_rim(Eigen::MatrixXd& heights) const;
+  /// Adjoint of continue_beyond_rim(); leaves the derivatives by the samples beyond the rim
+  /// unchanged.
+  void continue_beyond_rim_adjoint(Eigen::MatrixXd& heights_bar) const;
 
   /// Index in make_heights() of the first sample in the average at `at`, along an axis.
   [[nodiscard]] int first_sample(double at, int axis) const;
@@ -79,6 +80,11 @@ class AveragingGrid {
   Eigen::Vector2d sigma_;  ///< mm
   double rim_depth_;
   double rim_length_;
+  /// Weights of the samples 0 … 3 from the rim in those 1 … kReach beyond it.
+  using RimWeights = std::array<Eigen::Vector4d, GaussianWeights::kReach>;
+
+  [[nodiscard]] RimWeights rim_weights(int axis) const;
+
   Eigen::Vector2i cells_;
   Eigen::Vector2d step_;  ///< mm
 };
@@ -91,8 +97,8 @@ class AveragingGrid {
 /// distance d from a contact it leaves (1/R − f″) d²/2 above f, on average (1/R − f″) (1 + R f″)²
 /// p²/24 = p²/24R + f″ p²/24 + …; the first part is the same everywhere. This neglects waves of the
 /// pitch, of which polishing leaves exp(−2π²σ²/p²), and valleys sharper than the ball. A mould is
-/// the same with f turned over. Beyond the rim the surface continues point-symmetrically, as in
-/// PolishedField.
+/// the same with f turned over. Beyond the rim the surface goes on as it is cut there
+/// (continued_surface()).
 ///
 /// Averages are sums over an AveragingGrid. Their error is below 1e-5 of the height for waves at
 /// least 2σ long; for a spline with bumps of 1 µm it is 5e-8 mm and 1e-6 rad

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/lens/continued_surface.h"
 #include "core/spline/cubic_spline.h"
 
 namespace lensforge {
@@ -59,24 +60,26 @@ std::vector<SumPoint> gaussian_points(double sigma) {
 /// One node as a sum over all coefficients.
 class NodeSum {
  public:
-  explicit NodeSum(int cells)
-      : cells_(cells), value_(static_cast<std::size_t>(cells) + 3), slope_(value_.size()) {}
+  /// @param cell  length of a knot cell, mm.
+  NodeSum(int cells, double cell)
+      : cells_(cells),
+        cell_(cell),
+        value_(static_cast<std::size_t>(cells) + 3),
+        slope_(value_.size()) {}
 
   /// Adds `value` times the surface at t to the node's value and `slope` times it to its slope;
-  /// beyond its ends the surface continues point-symmetrically.
+  /// beyond its ends the surface goes on as continued_surface() does.
   void add(double t, double value, double slope) {
-    const double inside = t < 0.0 ? -t : (t > cells_ ? 2.0 * cells_ - t : t);
-    const double sign = inside == t ? 1.0 : -1.0;
-    const CubicBasis b = cubic_basis(std::clamp(inside, 0.0, static_cast<double>(cells_)), cells_);
+    const double inside = std::clamp(t, 0.0, static_cast<double>(cells_));
+    const double beyond = t - inside;
+    const double bent = RunOut{}.height(std::abs(beyond) * cell_) / (cell_ * cell_);
+    const CubicBasis b = cubic_basis(inside, cells_);
     for (std::size_t j = 0; j < b.value.size(); ++j) {
       const std::size_t i = static_cast<std::size_t>(b.first) + j;
-      value_[i] += sign * value * b.value[j];
-      slope_[i] += sign * slope * b.value[j];
+      const double height = b.value[j] + beyond * b.slope[j] + bent * b.bend[j];
+      value_[i] += value * height;
+      slope_[i] += slope * height;
     }
-    if (inside == t) return;
-    const std::size_t end = t < 0.0 ? 0 : value_.size() - 1;
-    value_[end] += 2.0 * value;
-    slope_[end] += 2.0 * slope;
   }
 
   [[nodiscard]] const std::vector<double>& value() const { return value_; }
@@ -84,6 +87,7 @@ class NodeSum {
 
  private:
   int cells_;
+  double cell_;
   std::vector<double> value_;
   std::vector<double> slope_;
 };
@@ -92,7 +96,8 @@ class NodeSum {
 void append(const NodeSum& sum, int first, AxisBasis& basis) {
   basis.first.push_back(first);
   for (int j = 0; j < basis.taps; ++j) {
-    const auto i = static_cast<std::size_t>(first + j);
+    const int coefficient = first + j;
+    const auto i = static_cast<std::size_t>(coefficient);
     basis.value.push_back(sum.value()[i]);
     basis.slope.push_back(sum.slope()[i]);
   }
@@ -146,7 +151,7 @@ AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
   basis.coefficients = along.cells + 3;
   basis.taps = std::min(basis.coefficients, 2 * reach + 4);
   for (const double t : points) {
-    NodeSum sum(along.cells);
+    NodeSum sum(along.cells, cell);
     for (const SumPoint& g : gaussian) {
       sum.add(t - g.at, g.weight + bend * g.second, g.first + bend * g.third);
     }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "cam/milled/polished_field.h"
 #include "cam/milled/rounded_field.h"
 #include "cam/milled_paths.h"
+#include "core/lens/continued_surface.h"
 #include "core/lens/smooth_surface.h"
 
 namespace lensforge {
@@ -87,7 +89,10 @@ BENCHMARK(SmoothNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();
 /// Cost of polishing in addition to the facets.
 void PolishedNodes(benchmark::State& state) {
   const Eigen::AlignedBox2d lens(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(kSide, kSide));
-  const PolishedField field(lens_facets(), lens, {0.03, 0.0, 1.0});
+  static const auto apron =
+      continued_surface(std::make_shared<const FacetSurface>(lens_mesh()), 0.5, RunOut{});
+  static const FacetField facets(apron->mesh());
+  const PolishedField field(facets, lens, {0.03, 0.0, 1.0});
   run(state, field);
 }
 BENCHMARK(PolishedNodes)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime();

@@ -14,6 +14,7 @@
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
 #include "cam/contact/cut_surface.h"
+#include "cam/plan/cut_plan.h"
 #include "cam/small_cuts.h"
 #include "core/error.h"
 #include "core/full_disk.h"
@@ -122,13 +123,14 @@ TEST(CamJob, ZZeroShiftsThePrograms) {
   options.workshop.stock.allowance = 0.25;
   const Lens lens = small_lens();
   const double top = lens.surface.vertices.row(2).maxCoeff();
+  const double blank = box_to_cut(lens, options).max().z() + 0.25;
   for (const auto& [zero, offset] : std::vector<std::pair<ZZero, double>>{
-           {ZZero::kStock, -top - 0.25}, {ZZero::kLens, -top}, {ZZero::kTable, 0.0}}) {
+           {ZZero::kStock, -blank}, {ZZero::kLens, -top}, {ZZero::kTable, 0.0}}) {
     const TempFolder folder;
     options.z_zero = zero;
     EXPECT_DOUBLE_EQ(run_cut(lens, options, folder).report.z_offset, offset) << words_for(zero);
     char safe[40];
-    std::snprintf(safe, sizeof safe, "G0 Z%.6f\n", top + 0.25 + 5.0 + offset);
+    std::snprintf(safe, sizeof safe, "G0 Z%.6f\n", blank + 5.0 + offset);
     EXPECT_THAT(read_bytes(folder / "finish.ngc"), HasSubstr(safe));
   }
 }

@@ -10,6 +10,7 @@
 #include "cam/adversarial_meshes.h"
 #include "cam/cam.h"
 #include "cam/contact/profile_cutter.h"
+#include "cam/plan/cut_plan.h"
 #include "cam/post/program_reader.h"
 #include "core/temp_folder.h"
 
@@ -90,7 +91,8 @@ TEST(CutAdversarial, NoMotionIsLowerThanItsCertificateSays) {
     const CamOptions options = coarse_programs();
     const CamResult result = make_cut(lens_of(mesh), options, folder.path(), Executor::cpu(2), {});
     ASSERT_TRUE(result.done()) << name;
-    const ProfileCutter surface(mesh);
+    const Lens lens = lens_of(mesh);
+    const ProfileCutter surface(cut_setup(lens, options).mesh());
     for (const ReportOperation& operation : result.report.operations) {
       const OperationSummary& summary = operation.summary;
       const Tool& tool = options.workshop.tool(summary.tool);

@@ -17,6 +17,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/dexel_stock.h"
 #include "cam/path/collision.h"
+#include "cam/plan/finishing.h"
 #include "cam/program_ways.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
@@ -111,7 +112,8 @@ CamOptions random_options(std::mt19937& random) {
     if (tool.number == shop.process.finish.tool) tool = resized(tool, pick(0.3, 1.7));
     if (tool.number == shop.process.rough.tool && coin()) tool.shape = CutterShape::kBall;
   }
-  shop.stock = {coin() ? 0.0 : pick(0.0, 2.0), pick(0.0, 1.0)};
+  const double apron = apron_to_cut(options);
+  shop.stock = {coin() ? apron : pick(apron, 2.0 + apron), pick(0.0, 1.0)};
   shop.process.safe_height = pick(kMinSafeHeight, 3.0);
   shop.process.rough.enabled = coin();
   shop.process.semi.enabled = coin();

@@ -199,13 +199,12 @@ struct Finish {
 
 Finish finish_of(const Shop& shop) {
   const MilledField milled(shop.paths(), kTop);
-  const SmoothField designed(*shop.surface);
   const auto meant = meant_surface(shop.surface);
   const Executor executor = Executor::cpu(2);
   const auto rounded = meant->rounded(shop.balls.surface(), ground().rectangle, executor);
   const PolishModel polish{0.03, 0.0, 1.0};
-  const PolishedField part(milled, designed, ground().rectangle, polish);
-  const PolishedField ideal(*rounded, designed, ground().rectangle, polish);
+  const PolishedField part(milled, ground().rectangle, polish);
+  const PolishedField ideal(*rounded, ground().rectangle, polish);
   constexpr std::int64_t kRows = 6;  // A pitch.
   GridWindow window = lens_grid({kWidth, kHeight}, 0.01);
   window.first_column = 390;

@@ -32,7 +32,6 @@ using lensforge::testing::TempFolder;
 using lensforge::testing::Way;
 using lensforge::testing::ways_of;
 using lensforge::testing::write_bytes;
-using ::testing::Contains;
 using ::testing::HasSubstr;
 
 using Files = std::vector<std::filesystem::path>;
@@ -165,7 +164,7 @@ CamOptions random_cut(Random& random) {
   constexpr std::array kEntries{EntryStyle::kRamp, EntryStyle::kHelix};
   CamOptions options = coarse_cut();
   Workshop& shop = options.workshop;
-  shop.stock = {random.pick(0.0, 6.0), random.pick(0.2, 2.0)};
+  shop.stock = {random.pick(0.45, 6.0), random.pick(0.2, 2.0)};
   shop.process.clearance = random.one_of(std::array{0.05, 0.3, 0.5});
   shop.process.rough.style = random.one_of(kStyles);
   shop.process.rough.along = random.one_of(kAxes);

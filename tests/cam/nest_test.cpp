@@ -38,6 +38,7 @@ TEST(NestLayout, RectanglesKeepTheirDistances) {
   std::uniform_real_distribution<double> side(5.0, 60.0);
   for (int round = 0; round < 50; ++round) {
     std::vector<NestItem> items;
+    items.reserve(9);
     for (int k = 0; k < 9; ++k) items.push_back({"", {side(random), side(random)}});
     const NestSheet sheet{{200.0, 400.0}, 0.1 * side(random), 0.1 * side(random)};
     const std::vector<Eigen::Vector2d> corners = place_in_rows(items, sheet);
@@ -104,6 +105,11 @@ class NestJob : public ::testing::Test {
 TEST_F(NestJob, WritesOneProgramForEachOperationAndAReportForEachLens) {
   const NestResult result = run();
   ASSERT_TRUE(result.done());
+  for (const NestedLens& lens : result.layout.lenses) {
+    for (const LimitCheck& check : lens.report.verdict.checks) {
+      EXPECT_TRUE(check.passes()) << lens.name << ' ' << check.key;
+    }
+  }
   EXPECT_TRUE(result.passes());
   EXPECT_EQ(result.tool_changes, 4);
   std::vector<std::string> names;

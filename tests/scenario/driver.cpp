@@ -163,6 +163,16 @@ void write(const fs::path& file, const std::string& content) {
   std::ofstream(file, std::ios::binary) << content;
 }
 
+nlohmann::json json_printed_by(const std::string& command) {
+  FILE* const output = popen(command.c_str(), "r");
+  std::string text;
+  for (int c = std::fgetc(output); c != EOF; c = std::fgetc(output)) {
+    text.push_back(static_cast<char>(c));
+  }
+  EXPECT_EQ(pclose(output), 0) << command;
+  return nlohmann::json::parse(text, nullptr, false);
+}
+
 void expect_refusal(const Outcome& outcome, int exit_code, const std::vector<std::string>& parts) {
   EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
   EXPECT_EQ(outcome.out, "");

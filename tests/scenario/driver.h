@@ -86,6 +86,9 @@ void place_small_lens(const fs::path& folder);
 std::string content(const fs::path& file);
 void write(const fs::path& file, const std::string& content);
 
+/// What a command of the shell, which should succeed, prints.
+nlohmann::json json_printed_by(const std::string& command);
+
 /// Fails unless the run ended with `exit_code`, printed nothing on stdout and one line on stderr
 /// that holds each of `parts`.
 void expect_refusal(const Outcome& outcome, int exit_code, const std::vector<std::string>& parts);

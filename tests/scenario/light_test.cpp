@@ -136,14 +136,7 @@ TEST_P(EveryLight, ProjectsThePictureIsRenderedTheSameAndStatedByInfo) {
 
 /// Metrics of a lens folder as tests/tracer/ finds them.
 nlohmann::json traced(const std::string& folder, const std::string& model) {
-  const std::string command = std::string(LENSFORGE_TRACER) + " '" + folder + "' " + model;
-  FILE* const output = popen(command.c_str(), "r");
-  std::string text;
-  for (int c = std::fgetc(output); c != EOF; c = std::fgetc(output)) {
-    text.push_back(static_cast<char>(c));
-  }
-  EXPECT_EQ(pclose(output), 0) << folder << ' ' << model;
-  return nlohmann::json::parse(text, nullptr, false);
+  return json_printed_by(std::string(LENSFORGE_TRACER) + " '" + folder + "' " + model);
 }
 
 void expect_traced_metrics(const std::string& folder) {

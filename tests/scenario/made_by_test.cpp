@@ -83,6 +83,30 @@ TEST_F(MadeBy, ACastPartIsDesignedForItsMould) {
   EXPECT_THAT(warnings(), HasSubstr("was designed for a pitch of 0.036 mm"));
 }
 
+/// The programs, cut by brute force into a blank that goes on beyond the lens, polished and traced
+/// by code of its own, rim included.
+TEST_F(MadeBy, APartByBruteForceHasTheForecastsPictureUpToItsRim) {
+  for (const Arguments& how : {Arguments{"--model", "facet"}, Arguments{"--model", "smooth"},
+                               Arguments{"--made-by", path("shop.toml")}}) {
+    SCOPED_TRACE(how.back());
+    ASSERT_EQ(design(how).exit_code, 0);
+    cut({"--z-zero", "table"});
+    const nlohmann::json report = json_at("lens/cam/report.json");
+    const double top = report["setup"]["blank"]["max"][2];
+    const std::string command = std::string(LENSFORGE_PART_TRACER) + " '" + path("lens") +
+                                "' 0.2 0.03 " + std::to_string(top) + " '" +
+                                path("lens/cam/finish.ngc") + "'";
+    const double traced = json_printed_by(command)["mae"];
+    EXPECT_NEAR(part_mae(), traced, std::max(2e-4, 0.1 * traced));
+  }
+}
+
+TEST_F(MadeBy, ABlankThatEndsTooNearToTheLensIsRefused) {
+  place_small_lens(at("lens"));
+  expect_refusal(cut({"--margin", "0.3mm"}), 2, {"stock.margin 0.3", "0.44 mm works"});
+  EXPECT_NE(cut({"--margin", "0.44mm", "--no-render"}).exit_code, 2);
+}
+
 TEST_F(MadeBy, WhatCannotBeDesignedForIsRefused) {
   expect_refusal(design({"--made-by", "default", "--model", "facet"}), 2,
                  {"--made-by default", "--model spline", "facet"});

@@ -5,8 +5,6 @@
 // surface the ray of every vertex is traced and its landing points are interpolated, as that page
 // says, of a spline that of many points in every knot cell.
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -15,6 +13,7 @@
 
 #include "tracer/clipped_picture.h"
 #include "tracer/lens_files.h"
+#include "tracer/picture_errors.h"
 #include "tracer/spline_surface.h"
 #include "tracer/traced_light.h"
 
@@ -40,12 +39,6 @@ std::vector<Vec3> smooth_normals(const Mesh& mesh) {
   for (Vec3& n : sums) n.normalize();
   return sums;
 }
-
-/// Picture and all the light that the surface takes.
-struct Traced {
-  ClippedPicture picture;
-  double whole = 0.0;
-};
 
 /// A point of the surface: its ray, and where that lands.
 struct Sample {
@@ -102,36 +95,13 @@ Traced trace(const TracedLight& light, const Mesh& mesh, const std::string& mode
   return traced;
 }
 
-/// sRGB of linear light (IEC 61966-2-1), clipped to what a screen shows.
-double shown(double linear) {
-  const double x = std::clamp(linear, 0.0, 1.0);
-  return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
-}
-
-void print_errors(const Traced& traced, const Picture& target) {
-  double total = 0.0;
-  double largest = 0.0;
-  for (const double t : target.light) {
-    total += t;
-    largest = std::max(largest, t);
-  }
-  double mae = 0.0;
-  double linear = 0.0;
-  for (std::size_t i = 0; i < target.light.size(); ++i) {
-    const double light = traced.picture.light()[i] / traced.whole * total;
-    mae += std::abs(shown(light) - shown(target.light[i]));
-    linear += std::abs(light - target.light[i]) / largest;
-  }
-  const auto count = static_cast<double>(target.light.size());
-  std::printf("{\"mae\": %.9g, \"mae_linear\": %.9g}\n", mae / count, linear / count);
-}
-
 void judge(const std::string& folder, const std::string& model) {
   const TracedLight light(read_json(folder + "/lens.json"), folder);
   const Picture target = read_picture(folder + "/target.exr");
   const Mesh mesh = model == "spline" ? read_spline(folder + "/surface.spline")
                                       : read_mesh(folder + "/surface.ply");
-  print_errors(trace(light, mesh, model, target), target);
+  const PictureErrors errors = picture_errors(trace(light, mesh, model, target), target, 0);
+  std::printf("{\"mae\": %.9g, \"mae_linear\": %.9g}\n", errors.mae, errors.linear);
 }
 
 }  // namespace

@@ -29,7 +29,6 @@ class Formula final : public SurfaceField {
     resize_patch(window, true, patch);
     for (std::int64_t n = 0; n < window.size(); ++n) {
       const Eigen::Vector2d q = window.node(n % window.columns, n / window.columns);
-      EXPECT_TRUE(kLens.exteriorDistance(q) < 1e-9);
       const Eigen::Vector3d at = function_(q.x(), q.y());
       const auto i = static_cast<std::size_t>(n);
       patch.z[i] = at[0];
@@ -61,19 +60,17 @@ TEST(PolishedField, APlaneStaysAPlaneToTheRim) {
   EXPECT_TRUE(patch.cut.empty());
 }
 
-/// Largest error of a plane's slope across the rows of a ball, whose marks begin somewhere in a
-/// pass.
-double marks_tilt(double phase, bool form_known) {
+/// Largest error of a plane's slope across the rows of a ball that go on beyond it, whose marks
+/// begin somewhere in a pass.
+double marks_tilt(double phase) {
   constexpr double kPitch = 0.045;
-  const Formula form(plane);
   const Formula cut([&](double x, double y) {
     const double row = y / kPitch + phase;
     const double offset = kPitch * (row - std::round(row));
     const Eigen::Vector3d on = plane(x, y);
     return Eigen::Vector3d(on[0] + offset * offset / 0.4, on[1], on[2] + offset / 0.2);
   });
-  const PolishModel polish{0.03, 0.0, 1.0};
-  const PolishedField part(cut, form_known ? form : cut, kLens, polish);
+  const PolishedField part(cut, kLens, {0.03, 0.0, 1.0});
   double worst = 0.0;
   for (const double slope : testing::sampled(part, whole_lens()).slope_y) {
     worst = std::max(worst, std::abs(slope + 0.2));
@@ -81,11 +78,10 @@ double marks_tilt(double phase, bool form_known) {
   return worst;
 }
 
-TEST(PolishedField, MarksOnAPlaneTiltItLittleAtTheRim) {
-  for (const double phase : {0.0, 0.3, 0.5}) {
-    EXPECT_LT(marks_tilt(phase, true), 0.0025) << phase;
-  }
-  EXPECT_GT(marks_tilt(0.0, false), 0.01);  // Turned with the plane.
+/// Of the marks' slopes, up to 0.11, polish leaves 1e-5, and the nodes, four and a half a pass,
+/// alias to the rest. Where marks were mirrored at the rim they tilted it by up to 0.0025.
+TEST(PolishedField, MarksOnAPlaneDoNotTiltItAtTheRim) {
+  for (const double phase : {0.0, 0.3, 0.5}) EXPECT_LT(marks_tilt(phase), 6e-4) << phase;
 }
 
 TEST(PolishedField, AWaveFadesAsTheGaussiansTransferFunctionSays) {

@@ -101,8 +101,7 @@ class PartModelTest : public ::testing::Test {
     milled_ = milled(kRadius, unmoved);
     designed_ = render_field(meant_->field(), fine(setup()), executor(), {});
     target_ = designed_.image(kPixels * kPixels);
-    model_ = std::make_unique<PartModel>(*milled_, meant_->field(), part_plan(), executor(),
-                                         RunControl());
+    model_ = std::make_unique<PartModel>(*milled_, part_plan(), executor(), RunControl());
     nominal_ = chain(*milled_, kSigma, setup());
     model_nominal_ = of_model({});
   }
@@ -119,7 +118,7 @@ class PartModelTest : public ::testing::Test {
     Passes passes;
     passes.pitch = plan_.pitch;
     passes.ball_radius = kRadius;
-    return {setup(), passes, {kSigma, 0.0, 1.0}, 1.3 * kSigma};
+    return {setup(), passes, {kSigma, 0.0, 1.0}, 1.3 * kSigma, kBeyond};
   }
 
   static FieldRenderSetup fine(const OpticalSetup& optics) {
@@ -154,8 +153,7 @@ class PartModelTest : public ::testing::Test {
 
   /// By the surfaces of cam's chain: polished and rendered as finely as there.
   static PictureQuality chain(const SurfaceField& cut, double sigma, const OpticalSetup& optics) {
-    const PolishedField part(cut, meant_->field(),
-                             {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
+    const PolishedField part(cut, {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
                              {sigma, 0.0, 1.0});
     return judged(render_field(part, fine(optics), executor(), {}));
   }
@@ -242,9 +240,8 @@ TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
     const PictureJudge judge(target, designed, {});
     PartPlan plan = part_plan();
     plan.optics = optics;
-    const PartModel model(*milled_, meant_->field(), plan, executor(), RunControl());
-    const PolishedField part(*milled_, meant_->field(),
-                             {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
+    const PartModel model(*milled_, plan, executor(), RunControl());
+    const PolishedField part(*milled_, {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
                              {kSigma, 0.0, 1.0});
     for (const double farther : {0.0, 0.3}) {
       OpticalSetup moved = optics;
@@ -350,8 +347,7 @@ TEST_F(PartModelTest, ASourceBlursThePictureAsManyDirectionsDo) {
       OpticalSetup optics = setup();
       const Eigen::Vector3d way(angle * std::cos(heading), angle * std::sin(heading), 1.0);
       optics.lamp = ParallelLight{way.normalized()};
-      const PolishedField part(*milled_, meant_->field(),
-                               {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
+      const PolishedField part(*milled_, {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
                                {kSigma, 0.0, 1.0});
       FieldRenderSetup coarse{optics, lens_grid(optics.lens_size, kPitch / 4.0)};
       const FluxPicture one = render_field(part, coarse, executor(), {});

@@ -47,11 +47,12 @@ class Toy {
     plan_.optics.focal_length = 14.0;
     plan_.polish.sigma = 0.03;
     plan_.largest_sigma = 0.04;
+    plan_.apron = 0.5;
     const FieldRenderSetup fine{plan_.optics, lens_grid(plan_.optics.lens_size, 0.02)};
     designed_ = render_field(bowl_, fine, executor_, {});
     target_ = designed_.image(144.0);
     judge_.emplace(target_, designed_, LeakageOptions{});
-    model_.emplace(bowl_, bowl_, plan_, executor_, RunControl());
+    model_.emplace(bowl_, plan_, executor_, RunControl());
     source_.lens_size = plan_.optics.lens_size;
     source_.passes = plan_.passes;
     source_.seed = 3;
