@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <vector>
 
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
@@ -14,12 +16,16 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/lens/lens.h"
+#include "core/lens/optical_surface.h"
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
+#include "core/spline/control_net.h"
+#include "core/text/number_text.h"
 #include "design/design.h"
 #include "design/render.h"
 #include "design/setup/option_tables.h"
+#include "design/waves/wave_picture.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
@@ -33,6 +39,8 @@ struct RenderArguments {
   std::string target;
   Background background;  ///< Of the target.
   bool force = false;
+  bool waves = false;
+  double wavelength_nm = 550.0;
   RenderOptions render;
 };
 
@@ -41,6 +49,7 @@ struct Scene {
   SurfaceMesh surface;
   std::optional<Eigen::Matrix3Xd> normals;  ///< Of a solid's own surface, for the smooth model.
   std::optional<SampledSurface> spline;     ///< A lens's own, for the spline model.
+  std::optional<ControlNet> net;            ///< Likewise.
   RenderOptions render;
   std::optional<Image> target;
 };
@@ -54,6 +63,11 @@ void describe(Description& d, RenderArguments& arguments) {
   d.flag("--force", arguments.force, "replace a file that lensforge did not write");
   d.text("--target", arguments.target, "PICTURE", "compare with this; a lens has its own");
   describe(d, arguments.background);
+  d.flag("--waves", arguments.waves,
+         "the picture as a wave makes it, beside that of rays: diffraction softens what is finer "
+         "than √(λ f); takes seconds");
+  d.number("--wavelength", arguments.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength),
+           "NM", "of the wave; white light is as 550");
   describe(d, arguments.render);
 }
 
@@ -64,7 +78,7 @@ Scene load_solid(const std::string& source, CommandFrame& frame) {
                                       : " found by shape: the faces that point towards +z"));
   SampledSurface& samples = solid.samples;
   const RenderOptions render{SurfaceModel::kSmooth, setup_for_mesh(samples.mesh)};
-  return {std::move(samples.mesh), std::move(samples.normals), {}, render, {}};
+  return {std::move(samples.mesh), std::move(samples.normals), {}, {}, render, {}};
 }
 
 Scene load(const std::string& source, CommandFrame& frame) {
@@ -72,13 +86,15 @@ Scene load(const std::string& source, CommandFrame& frame) {
   if (is_folder(source)) {
     Lens lens = read_lens(source);
     note_unfinished_design(lens, frame.console());
-    Scene scene{std::move(lens.surface), {}, {}, {lens.model, lens.setup}, std::move(lens.target)};
+    Scene scene{std::move(lens.surface), {}, {}, {}, {lens.model, lens.setup},
+                std::move(lens.target)};
     if (lens.spline) scene.spline = picture_nodes(*lens.spline);
+    scene.net = std::move(lens.spline);
     return scene;
   }
   SurfaceMesh mesh = read_mesh(source);
   const RenderOptions render{RenderOptions{}.model, setup_for_mesh(mesh)};
-  return {std::move(mesh), {}, {}, render, {}};
+  return {std::move(mesh), {}, {}, {}, render, {}};
 }
 
 /// Returns the cost of a picture. @throw InputError if there is no room for it.
@@ -107,6 +123,25 @@ void require_spectrum(const Scene& scene, const OptionSet& options,
   }
 }
 
+/// @throw InputError if the options do not fit a picture by waves.
+void require_waves(const Scene& scene, const OptionSet& options, const RenderArguments& arguments) {
+  if (!arguments.waves) {
+    if (!options.given("--wavelength")) return;
+    throw InputError("--wavelength: needs --waves");
+  }
+  if (scene.render.model == SurfaceModel::kFacet) {
+    throw InputError(
+        "--waves: facets have creases, which a wave does not show as rays do; use "
+        "--model smooth or a lens that was designed as a spline");
+  }
+  if (!scene.render.setup.spectrum.none()) {
+    throw InputError("--waves: is a picture of one wavelength; leave out --wavelengths");
+  }
+  if (scene.normals) {
+    throw InputError("--waves: needs a lens or a mesh; " + arguments.source + " is a solid");
+  }
+}
+
 /// The scene with everything that the options say instead.
 Scene adjusted(Scene scene, CommandFrame& frame, RenderArguments& arguments) {
   OptionSet& options = frame.options();
@@ -119,6 +154,7 @@ Scene adjusted(Scene scene, CommandFrame& frame, RenderArguments& arguments) {
   }
   const OpticalSetup& setup = scene.render.setup;
   require_spectrum(scene, options, arguments);
+  require_waves(scene, options, arguments);
   const WorkEstimate work = require_room_for_picture(setup, arguments.out);
   if (options.given("--target")) {
     LoadedImage target = read_image(arguments.target, frame.control(), setup.pixels.maxCoeff(),
@@ -249,6 +285,39 @@ Rendering render_spectrum(const Scene& scene, const Executor& executor) {
   return rendering;
 }
 
+/// Adds the picture by waves; it takes the place of that by rays.
+void add_waves(const Scene& scene, double wavelength_nm, CommandFrame& frame,
+               Rendering& rendering) {
+  const OpticalSetup& setup = scene.render.setup;
+  const SurfaceModel model = scene.render.model;
+  const std::shared_ptr<const OpticalSurface> surface =
+      model == SurfaceModel::kSpline ? std::make_shared<const SplineSurface>(*scene.net)
+                                     : optical_surface(scene.surface, model);
+  WaveOptions options;
+  options.wavelength = 1e-6 * wavelength_nm;
+  options.detail = wave_detail(*surface);
+  const std::vector<double> flux =
+      wave_flux(setup, wave_surface(*surface), options, frame.executor(), frame.control());
+  rendering.image = Image(setup.pixels.x(), setup.pixels.y());
+  const double total = scene.target ? scene.target->total() : setup.pixels.prod();
+  double inside = 0.0;
+  for (std::size_t i = 0; i < flux.size(); ++i) {
+    rendering.image.values()[i] = static_cast<float>(total * flux[i]);
+    inside += flux[i];
+  }
+  nlohmann::json waves{{"wavelength_nm", wavelength_nm}, {"flux_inside", inside}};
+  rendering.text += "  by waves of " + trimmed_decimal(wavelength_nm, 1) + " nm  ";
+  if (scene.target) {
+    ImageMetrics metrics = compare(rendering.image, *scene.target);
+    metrics.flux_inside = inside;
+    waves.update(metrics_json(metrics));
+    rendering.text += metrics_text(metrics) + "\n";
+  } else {
+    rendering.text += "flux inside " + fixed(100.0 * inside, 1) + " %\n";
+  }
+  rendering.json["waves"] = waves;
+}
+
 Rendering rendered(const Scene& scene, const Executor& executor) {
   if (!scene.render.setup.spectrum.none()) return render_spectrum(scene, executor);
   return scene.target ? compare_models(scene, executor) : render_alone(scene, executor);
@@ -287,6 +356,7 @@ CommandResult run(CommandFrame& frame, RenderArguments& arguments) {
   const ChosenDevice device = frame.device_executor();
   frame.control().report({"picture", 0.0, 0.0, ""});
   Rendering rendering = rendered(scene, device.executor);
+  if (arguments.waves) add_waves(scene, arguments.wavelength_nm, frame, rendering);
   if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, frame);
   rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;

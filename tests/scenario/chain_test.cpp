@@ -102,6 +102,37 @@ TEST_F(Chain, RenderOfALensRepeatsItsMetricsAndPicture) {
   EXPECT_EQ(read_image(at("again.exr")).image, read_image(at("lens/render.exr")).image);
 }
 
+TEST_F(Chain, RenderByWavesIsBesideThatByRays) {
+  place_small_lens(at("lens"));
+  const Outcome outcome = run({"render", path("lens"), "--waves", "--model", "smooth", "--json",
+                               "--wavelength", "650", "--out", path("waves.exr")});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json waves = outcome.json()["waves"];
+  EXPECT_EQ(waves["wavelength_nm"], 650.0);
+  EXPECT_GT(waves["flux_inside"], 0.9);
+  const nlohmann::json rays = outcome.json()["metrics"]["smooth"];
+  EXPECT_NE(waves["mae"], rays["mae"]);
+  EXPECT_NEAR(waves["mae"].get<double>(), rays["mae"].get<double>(), 0.05);
+  EXPECT_GT(read_image(at("waves.exr")).image.total(), 0.0F);
+  const Outcome blue = run(
+      {"render", path("lens"), "--waves", "--model", "smooth", "--json", "--wavelength", "450"});
+  EXPECT_NE(blue.json()["waves"]["mae"], waves["mae"]);
+}
+
+TEST_F(Chain, RenderRefusesWhatWavesCannotShow) {
+  place_small_lens(at("lens"));
+  expect_refusal(run({"render", path("lens"), "--waves", "--model", "facet"}), 2,
+                 {"--waves", "facets", "--model smooth"});
+  expect_refusal(run({"render", path("lens"), "--wavelength", "450"}), 2,
+                 {"--wavelength", "--waves"});
+  expect_refusal(
+      run({"render", path("lens"), "--waves", "--model", "smooth", "--wavelength", "90"}), 2,
+      {"--wavelength", "380"});
+  expect_refusal(
+      run({"render", path("lens"), "--waves", "--model", "smooth", "--wavelengths", "450,550"}), 2,
+      {"--waves", "--wavelengths"});
+}
+
 TEST_F(Chain, RenderTakesAnotherResolution) {
   place_small_lens(at("lens"));
   ASSERT_EQ(run({"render", path("lens"), "--pixels", "48", "--out", path("fine.png")}).exit_code,

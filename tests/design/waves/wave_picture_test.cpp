@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/waves/wave_picture.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <numbers>
+#include <numeric>
+#include <vector>
+
+#include "core/image/transfer.h"
+#include "core/lens/optical_surface.h"
+#include "design/render.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kHeight = 3.0;  ///< Of flat surfaces, mm.
+
+/// A surface from its formula, f(x, y) = z and slopes.
+template <class Formula>
+WaveSurface surface_of(const Formula& f) {
+  return [f](const WaveGrid& grid, WaveSamples& samples) {
+    samples = {};
+    for (int j = 0; j < grid.rows; ++j) {
+      for (int i = 0; i < grid.columns; ++i) {
+        const Eigen::Vector2d at = grid.place(i, j);
+        const Eigen::Vector3d point = f(at.x(), at.y());
+        samples.z.push_back(point[0]);
+        samples.slope_x.push_back(point[1]);
+        samples.slope_y.push_back(point[2]);
+      }
+    }
+  };
+}
+
+/// A square lens before a wall of as many pixels, 75 mm from the surface.
+OpticalSetup setup_of(double side, int pixels, double distance = 75.0) {
+  OpticalSetup setup;
+  setup.lens_size = {side, side};
+  setup.image_size = {side, side};
+  setup.pixels = {pixels, pixels};
+  setup.focal_length = kHeight + distance;
+  return setup;
+}
+
+WaveOptions in_one_piece() {
+  WaveOptions options;
+  options.tile = 0.0;
+  return options;
+}
+
+std::vector<double> waves(const OpticalSetup& setup, const WaveSurface& surface,
+                          const WaveOptions& options, int threads = 2) {
+  return wave_flux(setup, surface, options, Executor::cpu(threads), {});
+}
+
+double sum_of(const std::vector<double>& flux) {
+  return std::accumulate(flux.begin(), flux.end(), 0.0);
+}
+
+/// Mean absolute difference of two pictures as a display shows them.
+double difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  const auto count = static_cast<double>(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    sum += std::abs(encode(0.5 * count * a[i]) - encode(0.5 * count * b[i]));
+  }
+  return sum / count;
+}
+
+/// Light of every pixel behind a slit of width `side`, as shares of it (Goodman, section 4.5.1).
+std::vector<double> slit(double side, int pixels, double distance, double wavelength) {
+  constexpr int kParts = 60;
+  const double scale = std::sqrt(2.0 / (wavelength * distance));
+  std::vector<double> light(static_cast<std::size_t>(pixels), 0.0);
+  for (int k = 0; k < pixels * kParts; ++k) {
+    const double x = side * (k + 0.5) / (pixels * kParts);
+    std::complex<double> sum = 0.0;
+    constexpr int kSteps = 4000;
+    for (int s = 0; s < kSteps; ++s) {
+      const double t = scale * (side * (s + 0.5) / kSteps - x);
+      sum += std::polar(scale * side / kSteps, 0.5 * std::numbers::pi * t * t);
+    }
+    light[static_cast<std::size_t>(k / kParts)] += 0.5 * std::norm(sum) / (pixels * kParts);
+  }
+  return light;
+}
+
+TEST(WavePicture, AFlatLensIsASquareAperture) {
+  const OpticalSetup setup = setup_of(2.0, 16);
+  const auto flat = surface_of([](double, double) { return Eigen::Vector3d(kHeight, 0.0, 0.0); });
+  const std::vector<double> one = slit(2.0, 16, 75.0, 550e-6);
+  // As finely as it takes, and by default.
+  WaveOptions fine = in_one_piece();
+  fine.scatter = 0.04;
+  for (const WaveOptions& options : {fine, WaveOptions{550e-6, 0.04, 0.0, 3.0, 1.5}}) {
+    const std::vector<double> flux = waves(setup, flat, options);
+    for (int row = 0; row < 16; ++row) {
+      for (int column = 0; column < 16; ++column) {
+        const double expected =
+            256.0 * one[static_cast<std::size_t>(row)] * one[static_cast<std::size_t>(column)];
+        EXPECT_NEAR(256.0 * flux[static_cast<std::size_t>(row * 16 + column)], expected,
+                    options.tile > 0.0 ? 0.03 : 2e-3)
+            << row << ' ' << column;
+      }
+    }
+  }
+}
+
+/// A hyperbola sends all its light to one line; the line's light is sinc².
+TEST(WavePicture, ACylindersFocusIsASinc) {
+  constexpr double kSide = 1.6;
+  constexpr double kDistance = 75.0;
+  constexpr double kIndex = 1.49;
+  OpticalSetup setup = setup_of(kSide, 80);
+  setup.ior = kIndex;
+  setup.image_size.y() = 2.0 * kSide;
+  setup.image_origin.y() = -0.5 * kSide;
+  setup.pixels = {80, 4};
+  // n z + √(x² + (D − z)²) is the same for all x, z from the apex on.
+  const auto lens = surface_of([&](double x, double) {
+    const double u = x - 0.5 * kSide;
+    const double a = kIndex * kIndex - 1.0;
+    const double b = kDistance * (kIndex - 1.0);
+    // (n² − 1) z² − 2 b z + … of (D + z (…)): solved for z ≤ 0.
+    const double z = (b - std::sqrt(b * b + a * u * u)) / a;
+    const double root = std::sqrt(b * b + a * u * u);
+    return Eigen::Vector3d(kHeight + z, -u / root, 0.0);
+  });
+  WaveOptions options = in_one_piece();
+  options.detail = 0.02;
+  options.scatter = 0.06;
+  const std::vector<double> flux = waves(setup, lens, options);
+  const double pixel = kSide / 80.0;
+  for (int column = 30; column < 50; ++column) {
+    double expected = 0.0;
+    for (int k = 0; k < 50; ++k) {
+      const double x = (column - 40 + (k + 0.5) / 50.0) * pixel;
+      const double t = std::numbers::pi * kSide * x / (550e-6 * kDistance);
+      const double sinc = std::abs(t) < 1e-9 ? 1.0 : std::sin(t) / t;
+      expected += sinc * sinc / 50.0 * pixel * kSide / (550e-6 * kDistance);
+    }
+    double light = 0.0;
+    for (std::size_t row = 0; row < 4; ++row) {
+      light += flux[row * 80 + static_cast<std::size_t>(column)];
+    }
+    // Of all light; 0.2 % of the peak spills over the picture's ends along the line.
+    EXPECT_NEAR(light, expected, 2.5e-3) << column;
+  }
+}
+
+/// A ripple of 30 nm and of 120 nm sends J_m² of the light into order m, whatever its slopes.
+TEST(WavePicture, OrdersOfASinusoidalRippleAreBessels) {
+  constexpr double kPeriod = 0.06;
+  constexpr double kSide = 1.2;
+  for (const double amplitude : {30e-6, 120e-6}) {
+    OpticalSetup setup = setup_of(kSide, 4);
+    setup.image_size = {9.0, kSide};
+    setup.image_origin = {-3.9, 0.0};
+    setup.pixels = {180, 1};
+    const auto ripple = surface_of([&](double x, double) {
+      const double phase = kTwoPi * x / kPeriod;
+      return Eigen::Vector3d(kHeight + amplitude * std::sin(phase),
+                             kTwoPi * amplitude / kPeriod * std::cos(phase), 0.0);
+    });
+    WaveOptions options = in_one_piece();
+    options.detail = 0.01;
+    options.scatter = 5.0 * options.wavelength / kPeriod;
+    const std::vector<double> flux = waves(setup, ripple, options);
+    const double depth = kTwoPi * (setup.ior - 1.0) * amplitude / options.wavelength;
+    const double apart = 75.0 * options.wavelength / kPeriod;  // 0.69 mm
+    for (int order = -3; order <= 3; ++order) {
+      // The order's light is as wide as the lens; orders overlap, so their sums are compared over
+      // windows around them.
+      double light = 0.0;
+      double expected = 0.0;
+      for (int column = 0; column < 180; ++column) {
+        const double x = -3.9 + (column + 0.5) * 0.05 - 0.5 * kSide;
+        if (std::abs(x - order * apart) > 0.3) continue;
+        light += flux[static_cast<std::size_t>(179 - column)];
+        for (int m = -8; m <= 8; ++m) {
+          const double bessel = std::cyl_bessel_j(std::abs(m), depth);
+          if (std::abs(x - m * apart) <= 0.5 * kSide) expected += bessel * bessel * 0.05 / kSide;
+        }
+      }
+      EXPECT_NEAR(light, expected, 0.02) << order << ' ' << amplitude;
+    }
+  }
+}
+
+/// Gentle bumps, as of a lens; their rays do not cross before the wall.
+auto bumps() {
+  return surface_of([](double x, double y) {
+    constexpr double kHigh = 4e-4;
+    const double kx = kTwoPi / 1.3;
+    const double ky = kTwoPi / 1.7;
+    return Eigen::Vector3d(kHeight + kHigh * std::sin(kx * x) * std::cos(ky * y),
+                           kHigh * kx * std::cos(kx * x) * std::cos(ky * y),
+                           -kHigh * ky * std::sin(kx * x) * std::sin(ky * y));
+  });
+}
+
+TEST(WavePicture, TilesHaveThePictureOfOnePiece) {
+  const OpticalSetup setup = setup_of(9.6, 48);
+  WaveOptions finest = in_one_piece();
+  finest.scatter = 0.04;
+  const std::vector<double> whole = waves(setup, bumps(), finest);
+  EXPECT_LT(difference(waves(setup, bumps(), {}), whole), 2e-4);
+  EXPECT_NEAR(sum_of(whole), 1.0, 0.02);
+}
+
+TEST(WavePicture, NearsThatOfRaysAsTheWavelengthFalls) {
+  const OpticalSetup setup = setup_of(6.4, 32);
+  SampledSurface samples = make_samples({321, 321});
+  for (int j = 0; j < 321; ++j) {
+    for (int i = 0; i < 321; ++i) {
+      WaveSamples one;
+      bumps()({{0.02 * i, 0.02 * j}, {1.0, 1.0}, 1, 1}, one);
+      samples.mesh.vertices.col(j * 321 + i) << 0.02 * i, 0.02 * j, one.z[0];
+      samples.normals.col(j * 321 + i) << -one.slope_x[0], -one.slope_y[0], 1.0;
+    }
+  }
+  const std::vector<double> rays =
+      flux_of_surface(samples.mesh, samples.normals, setup, Executor::cpu(2));
+  WaveOptions options;
+  options.tile = 16.0;
+  const double usual = difference(waves(setup, bumps(), options), rays);
+  options.wavelength = 137.5e-6;
+  const double quarter = difference(waves(setup, bumps(), options), rays);
+  EXPECT_GT(usual, 1e-3);
+  EXPECT_LT(quarter, 0.6 * usual);
+}
+
+TEST(WavePicture, SameBitsForAnyNumberOfThreads) {
+  const OpticalSetup setup = setup_of(6.4, 32);
+  WaveOptions tiles;
+  tiles.tile = 8.0;
+  EXPECT_EQ(waves(setup, bumps(), tiles, 1), waves(setup, bumps(), tiles, 3));
+}
+
+}  // namespace
+}  // namespace lensforge
