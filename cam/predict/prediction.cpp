@@ -539,8 +539,8 @@ Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const Cut
   Prediction prediction =
       predict_part(surfaces, *setup.lens, options, setup.passes(), executor, control);
   if (options.remedies) {
-    try_remedies({setup, passes, surfaces.designed(), surfaces.part(), prediction.leakage},
-                 prediction.places, executor, control);
+    try_remedies({setup, passes, surfaces.part(), prediction.leakage}, prediction.places, executor,
+                 control);
   }
   if (options.tolerances > 0) {
     prediction.tolerances =

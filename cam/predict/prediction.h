@@ -50,8 +50,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
 struct TrialSite {
   const CutSetup& setup;
   const CutPasses& passes;
-  const SurfaceField& designed;  ///< Of the lens.
-  const SurfaceField& part;      ///< As predicted.
+  const SurfaceField& part;  ///< As predicted.
   const LeakageResult& leakage;
 };
 

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -431,7 +430,7 @@ std::shared_ptr<const OpticalSurface> continued_smooth(std::shared_ptr<const Smo
       if (vertex >= vertices) slopes.col(vertex) = parts.corners[n][k].slope;
     }
   }
-  return std::make_shared<const SmoothSurface>(std::move(parts.mesh), std::move(slopes));
+  return std::make_shared<const SmoothSurface>(parts.mesh, std::move(slopes));
 }
 
 /// Facets around facets, on the slopes of the mesh's own normals at its rim.

@@ -237,8 +237,13 @@ PatchCorners make_corners(const SurfaceMesh& mesh, const Eigen::Matrix2Xd& slope
 
 }  // namespace
 
-SmoothSurface::SmoothSurface(const SurfaceMesh& mesh)
-    : SmoothSurface(with_heights_of(mesh, vertex_slopes(mesh)), vertex_slopes(mesh)) {}
+SmoothSurface::Fitted SmoothSurface::fitted(const SurfaceMesh& mesh) {
+  Eigen::Matrix2Xd slopes = vertex_slopes(mesh);
+  SurfaceMesh through = with_heights_of(mesh, slopes);
+  return {std::move(through), std::move(slopes)};
+}
+
+SmoothSurface::SmoothSurface(const SurfaceMesh& mesh) : SmoothSurface(fitted(mesh)) {}
 
 SurfacePoint SmoothSurface::in_triangle(std::int64_t triangle,
                                         const Eigen::Vector3d& weights) const {

@@ -29,8 +29,8 @@ class SmoothSurface final : public OpticalSurface {
   /// @pre every triangle faces +z (height_field_fault()).
   explicit SmoothSurface(const SurfaceMesh& mesh);
   /// Through the mesh's vertices as they are, with these slopes there, 2 × V. @pre as above.
-  SmoothSurface(SurfaceMesh mesh, Eigen::Matrix2Xd slopes)
-      : OpticalSurface(std::move(mesh)), slopes_(std::move(slopes)) {}
+  SmoothSurface(const SurfaceMesh& mesh, Eigen::Matrix2Xd slopes)
+      : OpticalSurface(mesh), slopes_(std::move(slopes)) {}
 
   [[nodiscard]] bool has_creases() const override { return false; }
   [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
@@ -53,6 +53,10 @@ class SmoothSurface final : public OpticalSurface {
   [[nodiscard]] const Eigen::Matrix2Xd& slopes() const { return slopes_; }
 
  private:
+  using Fitted = std::pair<SurfaceMesh, Eigen::Matrix2Xd>;
+  static Fitted fitted(const SurfaceMesh& mesh);
+  explicit SmoothSurface(Fitted fit) : SmoothSurface(fit.first, std::move(fit.second)) {}
+
   Eigen::Matrix2Xd slopes_;
 };
 

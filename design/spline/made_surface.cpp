@@ -82,50 +82,48 @@ AveragingGrid::RimWeights AveragingGrid::rim_weights(int axis) const {
   return weights;
 }
 
-void AveragingGrid::continue_beyond_rim(Eigen::MatrixXd& heights) const {
-  const Eigen::Index right = heights.rows() - 1 - kReach;
-  const Eigen::Index top = heights.cols() - 1 - kReach;
-  const RimWeights along_x = rim_weights(0);
-  const RimWeights along_y = rim_weights(1);
+namespace {
+
+/// Calls `take(beyond, inside, weight)` for the numbers of every line of samples beyond both rims
+/// of an axis and of those that make it up. @param lines  of the axis, with those beyond.
+template <class Weights, class Take>
+void for_each_beyond(Eigen::Index lines, const Weights& weights, const Take& take) {
+  const Eigen::Index last = lines - 1 - kReach;
   for (Eigen::Index k = 1; k <= kReach; ++k) {
-    const Eigen::Vector4d& w = along_x[static_cast<std::size_t>(k - 1)];
-    heights.row(kReach - k).setZero();
-    heights.row(right + k).setZero();
+    const Eigen::Vector4d& w = weights[static_cast<std::size_t>(k - 1)];
     for (Eigen::Index j = 0; j < w.size(); ++j) {
-      heights.row(kReach - k) += w[j] * heights.row(kReach + j);
-      heights.row(right + k) += w[j] * heights.row(right - j);
-    }
-  }
-  for (Eigen::Index k = 1; k <= kReach; ++k) {
-    const Eigen::Vector4d& w = along_y[static_cast<std::size_t>(k - 1)];
-    heights.col(kReach - k).setZero();
-    heights.col(top + k).setZero();
-    for (Eigen::Index j = 0; j < w.size(); ++j) {
-      heights.col(kReach - k) += w[j] * heights.col(kReach + j);
-      heights.col(top + k) += w[j] * heights.col(top - j);
+      take(kReach - k, kReach + j, w[j]);
+      take(last + k, last - j, w[j]);
     }
   }
 }
 
+}  // namespace
+
+void AveragingGrid::continue_beyond_rim(Eigen::MatrixXd& heights) const {
+  heights.topRows(kReach).setZero();
+  heights.bottomRows(kReach).setZero();
+  for_each_beyond(heights.rows(), rim_weights(0),
+                  [&](Eigen::Index to, Eigen::Index from, double w) {
+                    heights.row(to) += w * heights.row(from);
+                  });
+  heights.leftCols(kReach).setZero();
+  heights.rightCols(kReach).setZero();
+  for_each_beyond(heights.cols(), rim_weights(1),
+                  [&](Eigen::Index to, Eigen::Index from, double w) {
+                    heights.col(to) += w * heights.col(from);
+                  });
+}
+
 void AveragingGrid::continue_beyond_rim_adjoint(Eigen::MatrixXd& heights_bar) const {
-  const Eigen::Index right = heights_bar.rows() - 1 - kReach;
-  const Eigen::Index top = heights_bar.cols() - 1 - kReach;
-  const RimWeights along_x = rim_weights(0);
-  const RimWeights along_y = rim_weights(1);
-  for (Eigen::Index k = 1; k <= kReach; ++k) {
-    const Eigen::Vector4d& w = along_y[static_cast<std::size_t>(k - 1)];
-    for (Eigen::Index j = 0; j < w.size(); ++j) {
-      heights_bar.col(kReach + j) += w[j] * heights_bar.col(kReach - k);
-      heights_bar.col(top - j) += w[j] * heights_bar.col(top + k);
-    }
-  }
-  for (Eigen::Index k = 1; k <= kReach; ++k) {
-    const Eigen::Vector4d& w = along_x[static_cast<std::size_t>(k - 1)];
-    for (Eigen::Index j = 0; j < w.size(); ++j) {
-      heights_bar.row(kReach + j) += w[j] * heights_bar.row(kReach - k);
-      heights_bar.row(right - j) += w[j] * heights_bar.row(right + k);
-    }
-  }
+  for_each_beyond(heights_bar.cols(), rim_weights(1),
+                  [&](Eigen::Index to, Eigen::Index from, double w) {
+                    heights_bar.col(from) += w * heights_bar.col(to);
+                  });
+  for_each_beyond(heights_bar.rows(), rim_weights(0),
+                  [&](Eigen::Index to, Eigen::Index from, double w) {
+                    heights_bar.row(from) += w * heights_bar.row(to);
+                  });
 }
 
 int AveragingGrid::first_sample(double at, int axis) const {

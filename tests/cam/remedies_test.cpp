@@ -71,7 +71,7 @@ class Predicted {
   }
 
   [[nodiscard]] TrialSite site() const {
-    return {setup_, passes_, surfaces().designed(), surfaces().part(), prediction_.leakage};
+    return {setup_, passes_, surfaces().part(), prediction_.leakage};
   }
   [[nodiscard]] const Executor& executor() const { return executor_; }
   [[nodiscard]] const PartSurfaces& surfaces() const { return cut_->surfaces(); }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/waves/plane_field.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <complex>
 #include <numbers>
+
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 namespace {
