@@ -123,10 +123,9 @@ class EmulatedExecutor {
   using PendingSum = FinishedSum<N>;
 
   static constexpr int kThreads = 128;  ///< Per block, as on the GPU.
-  /// True if arguments are searched for addresses. Without optimisation, with sanitizers, by clang
-  /// and by GCC 14, copies include the padding between members, which may hold old addresses.
-#if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && \
-    !defined(__clang__) && __GNUC__ < 14
+  /// True if arguments are searched for addresses: the compiler can clear the bytes between members,
+  /// which may hold old ones.
+#if __has_builtin(__builtin_clear_padding)
   static constexpr bool kFindsAddresses = true;
 #else
   static constexpr bool kFindsAddresses = false;
@@ -140,29 +139,24 @@ class EmulatedExecutor {
   void begin_kernel(const char* kernel, const Functor& functor) const {
     if (stop_.stop_requested()) throw Interrupted();
     static_assert(sizeof(Functor) <= 4096, "more than a kernel's arguments may take");
-    // Bytes that differ between copies made over zeros and over ones are unset: padding, which may
-    // hold an old address.
-    const auto zeros = copied_over(functor, 0x00);
-    const auto ones = copied_over(functor, 0xFF);
-    for (std::size_t i = 0; i < zeros.size(); ++i) {
-      const std::uintptr_t word = zeros[i];
-      if (kFindsAddresses && word == ones[i] && is_mapped(word) &&
-          !EmulatedMemory::instance().owns(word)) {
-        ADD_FAILURE() << "argument of kernel '" << kernel
-                      << "' points to the caller's memory (word " << i << ')';
+    for (const std::uintptr_t word : words_of(functor)) {
+      if (is_mapped(word) && !EmulatedMemory::instance().owns(word)) {
+        ADD_FAILURE() << "argument of kernel '" << kernel << "' points to the caller's memory";
       }
     }
   }
 
  private:
-  /// The words of a copy that was made where every byte was `fill`.
+  /// The words of a kernel's arguments with the bytes between members zero; all zero where the
+  /// compiler cannot do that.
   template <class Functor>
-  static auto copied_over(const Functor& functor, int fill) {
-    alignas(Functor) unsigned char memory[sizeof(Functor)];
-    std::memset(memory, fill, sizeof(memory));
-    new (memory) Functor(functor);
+  static auto words_of(const Functor& functor) {
     std::array<std::uintptr_t, sizeof(Functor) / sizeof(std::uintptr_t)> words{};
-    std::memcpy(words.data(), memory, sizeof(words));
+#if __has_builtin(__builtin_clear_padding)
+    Functor copy = functor;
+    __builtin_clear_padding(&copy);
+    std::memcpy(words.data(), static_cast<const void*>(&copy), sizeof(words));
+#endif
     return words;
   }
 
