@@ -223,4 +223,8 @@ nlohmann::json nest_json(const NestResult& result, bool reports);
 /// True if a nest may write a file of this name.
 bool is_name_of_nest(const std::string& name);
 
+/// @throw InputError naming a lens folder in which the files of a nest in `folder` would come.
+void require_no_lens_folder(const std::vector<NestLens>& lenses,
+                            const std::filesystem::path& folder);
+
 }  // namespace lensforge

@@ -197,6 +197,7 @@ CommandResult run(CommandFrame& frame, NestSettings& settings) {
   const std::vector<NestLens> lenses = sources.lenses();
   sources.note_unfinished(frame.console());
   const NestPlan plan = plan_nest(lenses, settings.nest);
+  require_no_lens_folder(lenses, settings.out);
   const WorkEstimate estimate = estimate_nest(plan, lenses, options.executor().concurrency());
   require_room_for_cut(plan.cuts.front(), lenses.front().lens->setup, estimate, settings.out);
   frame.begin_folder(settings.out).remove_partial_files(is_name_of_nest);

@@ -440,19 +440,6 @@ CutJob job_of(const std::vector<NestLens>& lenses, const NestPlan& plan, const C
   return job;
 }
 
-/// @throw InputError naming a lens folder in which the nest's files would come.
-void require_no_lens_folder(const std::vector<NestLens>& lenses, const fs::path& folder) {
-  if (fs::exists(folder / lens_file::kJson)) {
-    throw InputError("--out " + folder.string() + ": is a lens folder; name another one");
-  }
-  for (const NestLens& lens : lenses) {
-    const fs::path own = folder / lens.name;
-    if (!fs::exists(own / lens_file::kJson)) continue;
-    throw InputError("--out " + folder.string() + ": the reports of " + lens.name +
-                     " would come into the lens folder " + own.string() + "; name another folder");
-  }
-}
-
 /// Programs in the order in which they are run, and the tools that they need.
 void describe_programs(const ProgramFiles& all, NestResult& result) {
   int last = -1;
@@ -589,6 +576,18 @@ nlohmann::json nest_json(const NestResult& result, bool reports) {
 
 bool is_name_of_nest(const std::string& name) {
   return name == nest_file::kLayout || name == nest_file::kJson || is_name_of_cut(name);
+}
+
+void require_no_lens_folder(const std::vector<NestLens>& lenses, const fs::path& folder) {
+  if (fs::exists(folder / lens_file::kJson)) {
+    throw InputError("--out " + folder.string() + ": is a lens folder; name another one");
+  }
+  for (const NestLens& lens : lenses) {
+    const fs::path own = folder / lens.name;
+    if (!fs::exists(own / lens_file::kJson)) continue;
+    throw InputError("--out " + folder.string() + ": the reports of " + lens.name +
+                     " would come into the lens folder " + own.string() + "; name another folder");
+  }
 }
 
 NestResult make_nest(const std::vector<NestLens>& lenses, const NestOptions& options,

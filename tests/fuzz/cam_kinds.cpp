@@ -107,7 +107,7 @@ void cam_beside_clamps(Scene& scene) {
   }
   scene.write("shop.toml", shop);
   CommandLine line = scene.cam("lens").set("--workshop", "shop.toml");
-  line.set("--margin", std::to_string(scene.random.below(9)) + "mm");
+  line.set("--margin", std::to_string(1 + scene.random.below(8)) + "mm");
   scene.plan.must_work = true;
   scene.plan.must_not_say = {"goes down into material", "in 'rough' tool"};
   scene.run(line);
