@@ -23,7 +23,8 @@ namespace lensforge {
 /// Names of the files that make_cut() writes beside the programs.
 namespace cam_file {
 inline constexpr const char* kMilledMesh = "milled.ply";
-inline constexpr const char* kMilledPicture = "milled.png";
+inline constexpr const char* kMilledPicture = "milled.png";  ///< By rays.
+inline constexpr const char* kWall = "wall.png";  ///< As the part is judged: by waves or rays.
 inline constexpr const char* kLeakage = "leakage.png";
 inline constexpr const char* kReport = "report.json";
 inline constexpr const char* kPage = "report.html";

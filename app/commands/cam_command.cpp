@@ -126,6 +126,19 @@ std::string surface_text(const RenderedSurface& surface) {
          fixed(100.0 * surface.quality.leakage, 2) + " %\n";
 }
 
+/// The same by waves, and by what the part is judged.
+std::string wave_text(const ReportData& report) {
+  std::string text = "  " + report.judged_words() + "\n";
+  const auto add = [&text](RenderedSurface surface) {
+    surface.name += ", by waves";
+    text += surface_text(surface);
+  };
+  if (!report.waves) return text;
+  add(report.waves->result.designed);
+  for (const RenderedSurface& part : report.waves->result.others) add(part);
+  return text;
+}
+
 std::string summary_text(const fs::path& folder, const CamResult& result) {
   const ReportData& report = result.report;
   std::string text = folder.string() + ": " + result.message + "\n";
@@ -134,6 +147,7 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
   if (!report.leakage.steps.empty()) {
     text += surface_text(report.leakage.designed);
     for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
+    text += wave_text(report);
     for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
     if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }

@@ -52,6 +52,7 @@
 #include "design/schedule/levels.h"
 #include "design/setup/design_options.h"
 #include "design/setup/option_tables.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge::app {
 namespace {
@@ -468,13 +469,28 @@ std::vector<std::string> changes_made(const LoadedImage& loaded, const DesignSet
   return changes;
 }
 
-/// Prints a note if the source blurs the picture's finest detail.
-void note_source(const Image& picture, const DesignOptions& design, const Console& console) {
+/// Pixels of a blur from which on a picture is too fine for its light. Diffraction blurs one at the
+/// default distance and size, which a picture survives.
+double worth_telling(const PictureBlur& blur) { return blur.cause == "lamp" ? 1.0 : 1.5; }
+
+/// Prints a note if the light blurs the picture's finest detail.
+void note_blur(const Image& picture, const DesignOptions& design, const Console& console) {
   const Eigen::Vector2i pixels = working_size(picture.columns(), picture.rows(), design.pixels);
-  const double blur = source_blur(optical_setup(design, pixels), design.thickness);
-  if (!(blur > 1.0)) return;
-  console.note("the source's image is " + fixed(blur, 1) +
-               " pixels wide: no lens shows finer detail in this light");
+  const OpticalSetup setup = optical_setup(design, pixels);
+  const std::vector<PictureBlur> blurs =
+      light_blurs(setup, design.thickness, middle_wavelength(setup));
+  const PictureBlur& most = widest(blurs);
+  if (!(most.pixels > worth_telling(most))) return;
+  const int enough =
+      std::max(kMinPixels, static_cast<int>(std::ceil(pixels.maxCoeff() / most.pixels)));
+  console.note(blur_words(blurs) + ": no lens shows finer detail in this light; --pixels " +
+               std::to_string(enough) + " shows all of it, " + blur_remedy(most.cause) +
+               " shows more");
+}
+
+std::vector<PictureBlur> blurs_of(const Lens& lens) {
+  const double height = lens.surface.vertices.row(2).mean();
+  return light_blurs(lens.setup, height, middle_wavelength(lens.setup));
 }
 
 nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) {
@@ -488,6 +504,9 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
                             {"metrics", metrics_json(lens)},
                             {"iterations", result.convergence.size()},
                             {"seconds", lens.provenance.json()["seconds"]}};
+  for (const PictureBlur& blur : blurs_of(lens)) {
+    summary["blur"].push_back({{"cause", blur.cause}, {"pixels", blur.pixels}});
+  }
   if (result.source) summary["source_check"] = source_json(*result.source);
   if (result.colors) summary["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) summary["made"] = metrics_json(result.made->metrics);
@@ -499,7 +518,8 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
   return folder.string() + ": " + result.message + "\n" +  //
          metrics_text(lens) +                              //
          (result.colors ? fringe_text(result.colors->fringe) : "") +
-         (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") + "  " +
+         (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") +
+         "  on the wall " + blur_words(blurs_of(lens)) + "\n  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +
          fixed(lens.provenance.json()["seconds"].get<double>(), 1) + " s\n";
@@ -594,7 +614,7 @@ void note_begin(const DesignSettings& settings, const LoadedImage& loaded,
                  (spline ? "; the spline on the processor, unlike --model smooth or facet" : ""));
   }
   for (const std::string& change : changes_made(loaded, settings)) console.note(change);
-  note_source(loaded.image, design, console);
+  note_blur(loaded.image, design, console);
   // A design that was killed before its first checkpoint starts at the beginning.
   if (settings.resume && !design.resume) {
     console.note("nothing to resume: started the design from the beginning");

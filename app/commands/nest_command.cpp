@@ -136,7 +136,7 @@ std::string place_text(const NestedLens& lens) {
   std::string text =
       "  " + lens.name + " at X " + trimmed_decimal(at.x(), 2) + " Y " + trimmed_decimal(at.y(), 2);
   if (!lens.report.leakage.steps.empty()) {
-    const PictureQuality& part = lens.report.leakage.part().quality;
+    const PictureQuality& part = lens.report.judged().part().quality;
     text += ": " + metrics_text(part.metrics) + ", leaks " + fixed(100.0 * part.leakage, 2) + " %";
   }
   return text + (lens.cut_out ? "\n" : ", stays joined\n");

@@ -17,6 +17,7 @@
 #include "core/io/lens_folder.h"
 #include "core/lens/lens.h"
 #include "core/lens/optical_surface.h"
+#include "core/lens/surface_field.h"
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
@@ -295,9 +296,11 @@ void add_waves(const Scene& scene, double wavelength_nm, CommandFrame& frame,
                                      : optical_surface(scene.surface, model);
   WaveOptions options;
   options.wavelength = 1e-6 * wavelength_nm;
-  options.detail = wave_detail(*surface);
-  const std::vector<double> flux =
-      wave_flux(setup, wave_surface(*surface), options, frame.executor(), frame.control());
+  const OpticalField field(*surface);
+  const SurfaceField* const one = &field;
+  const std::vector<double> flux = wave_flux(setup, wave_grid(setup, *surface), {&one, 1}, options,
+                                             frame.executor(), frame.control())
+                                       .front();
   rendering.image = Image(setup.pixels.x(), setup.pixels.y());
   const double total = scene.target ? scene.target->total() : setup.pixels.prod();
   double inside = 0.0;

@@ -168,7 +168,7 @@ std::string choose(double goal, std::vector<ReportChoice>& ranking) {
 }
 
 ReportChoice ranked(const Choice& choice, const ReportData& report) {
-  const PictureQuality& part = report.leakage.part().quality;
+  const PictureQuality& part = report.judged().part().quality;
   return {choice.name,
           part.leakage,
           part.dark_flux,

@@ -372,11 +372,11 @@ CutFindings findings_of(const ProgramFiles& programs, const std::optional<Predic
   findings.slope = certificate.slope.value;
   findings.block_rate = programs.total.peak_lines_per_second;
   if (!prediction) return findings;
-  const PictureQuality& part = prediction->leakage.part().quality;
+  const PictureQuality& part = prediction->judged().part().quality;
   findings.leakage = part.leakage;
   findings.dark_flux = part.dark_flux;
   findings.mae_increase =
-      std::max(0.0, part.metrics.mae - prediction->leakage.designed.quality.metrics.mae);
+      std::max(0.0, part.metrics.mae - prediction->judged().designed.quality.metrics.mae);
   findings.fillet_depth =
       prediction->creases.worst.empty() ? 0.0 : prediction->creases.worst[0].depth;
   return findings;
@@ -551,6 +551,9 @@ Verdict whole_verdict(const WrittenCut& cut, const std::optional<Prediction>& pr
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
+  data.waves = prediction.waves;
+  data.light_words = prediction.light_words;
+  data.blurs = prediction.blurs;
   if (traits(data.body).transmits) data.ghost = ghost_share(lens.setup.ior);
   data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},

@@ -39,10 +39,9 @@ constexpr std::size_t kShortestCut = 30;   ///< Of a job's name shortened in a c
 constexpr std::string_view kJobKey = "job: ";
 
 /// Files that a cut writes beside its programs.
-constexpr std::array kBesidePrograms{cam_file::kReport,        cam_file::kPage,
-                                     cam_file::kMilledMesh,    cam_file::kMilledPicture,
-                                     cam_file::kLeakage,       lens_file::kPartSurfaces,
-                                     lens_file::kCausePictures};
+constexpr std::array kBesidePrograms{
+    cam_file::kReport, cam_file::kPage,    cam_file::kMilledMesh,    cam_file::kMilledPicture,
+    cam_file::kWall,   cam_file::kLeakage, lens_file::kPartSurfaces, lens_file::kCausePictures};
 
 /// check_seal(); unreadable files have none.
 std::optional<bool> seal_of(const fs::path& path) {
@@ -179,18 +178,23 @@ std::vector<const char*> cut_file_names(const CamOptions& options) {
 }
 
 void add_prediction_files(const Prediction& prediction, const Lens& lens, PendingFiles& files) {
-  const FluxPicture& part = prediction.leakage.part().picture;
+  const double total = lens.target.total();
+  const auto add_picture = [&](const char* name, const LeakageResult& result) {
+    files.add(name, [&result, total](const fs::path& beside) {
+      write_image(result.part().picture.image(total), beside);
+    });
+  };
   files.add(cam_file::kMilledMesh,
             [&](const fs::path& beside) { write_ply(prediction.milled, beside); });
-  files.add(cam_file::kMilledPicture,
-            [&](const fs::path& beside) { write_image(part.image(lens.target.total()), beside); });
+  add_picture(cam_file::kMilledPicture, prediction.leakage);
+  add_picture(cam_file::kWall, prediction.judged());
   files.add(cam_file::kLeakage, [&](const fs::path& beside) {
     write_image(leakage_picture(prediction.leakage), beside);
   });
   files.add(lens_file::kPartSurfaces,
             [&](const fs::path& beside) { write_layers(prediction.surfaces, beside); });
   files.add(lens_file::kCausePictures, [&](const fs::path& beside) {
-    write_layers(cause_layers(prediction.leakage, lens.target.total()), beside);
+    write_layers(cause_layers(prediction.leakage, total), beside);
   });
 }
 

@@ -18,8 +18,11 @@
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
+#include "core/text/number_text.h"
+#include "core/text/words.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 
@@ -107,40 +110,56 @@ double PictureJudge::dark_ratio(const FluxPicture& picture) const {
 
 namespace {
 
-/// Pictures of every surface of a chain, each rendered once. Steps come first: the surfaces that
-/// they are made from, including the designed one, are then cached.
-class ChainPictures {
- public:
-  ChainPictures(const LeakageChain& chain, const FieldRenderSetup& setup, const Executor& executor,
-                const RunControl& control) {
-    std::vector<const SurfaceField*> fields;
-    std::vector<const NamedSurface*> apart;
-    const auto take = [&](const NamedSurface& surface) {
-      LF_CHECK(surface.field != nullptr, surface.name);
-      if (std::find(fields.begin(), fields.end(), surface.field) != fields.end()) return;
-      if (surface.grid) return apart.push_back(&surface);
-      fields.push_back(surface.field);
-    };
-    for (const NamedSurface& step : chain.steps) take(step);
-    take(chain.designed);
-    for (const NamedSurface& other : chain.others) take(other);
-    std::vector<FluxPicture> rendered =
-        render_fields(fields, setup, executor, control, chain.observe);
-    for (std::size_t f = 0; f < fields.size(); ++f) pictures_[fields[f]] = std::move(rendered[f]);
-    for (const NamedSurface* surface : apart) {
-      FieldRenderSetup own = setup;
-      own.grid = *surface->grid;
-      pictures_[surface->field] = render_field(*surface->field, own, executor, control);
-    }
-  }
+/// Every surface of a chain and its picture.
+using ChainPictures = std::map<const SurfaceField*, FluxPicture>;
 
-  [[nodiscard]] const FluxPicture& of(const NamedSurface& surface) const {
-    return pictures_.at(surface.field);
-  }
+void add_once(const NamedSurface& surface, std::vector<const SurfaceField*>& fields) {
+  LF_CHECK(surface.field != nullptr, surface.name);
+  if (std::find(fields.begin(), fields.end(), surface.field) != fields.end()) return;
+  fields.push_back(surface.field);
+}
 
- private:
-  std::map<const SurfaceField*, FluxPicture> pictures_;
-};
+/// Steps come first: the surfaces that they are made from, including the designed one, are then
+/// cached.
+std::vector<const SurfaceField*> fields_of(const LeakageChain& chain) {
+  std::vector<const SurfaceField*> fields;
+  for (const NamedSurface& step : chain.steps) add_once(step, fields);
+  add_once(chain.designed, fields);
+  return fields;
+}
+
+ChainPictures pictures_by_rays(const LeakageChain& chain, const FieldRenderSetup& setup,
+                               const Executor& executor, const RunControl& control) {
+  std::vector<const SurfaceField*> fields = fields_of(chain);
+  for (const NamedSurface& other : chain.others) {
+    if (!other.grid) add_once(other, fields);
+  }
+  ChainPictures pictures;
+  std::vector<FluxPicture> rendered =
+      render_fields(fields, setup, executor, control, chain.observe);
+  for (std::size_t f = 0; f < fields.size(); ++f) pictures[fields[f]] = std::move(rendered[f]);
+  for (const NamedSurface& other : chain.others) {
+    if (!other.grid || pictures.contains(other.field)) continue;
+    FieldRenderSetup own = setup;
+    own.grid = *other.grid;
+    pictures[other.field] = render_field(*other.field, own, executor, control);
+  }
+  return pictures;
+}
+
+ChainPictures pictures_by_waves(const LeakageChain& chain, const FieldRenderSetup& setup,
+                                const WaveOptions& options, const Executor& executor,
+                                const RunControl& control) {
+  const std::vector<const SurfaceField*> fields = fields_of(chain);
+  const Eigen::Vector2i& pixels = setup.optics.pixels;
+  std::vector<std::vector<double>> flux =
+      wave_flux(setup.optics, setup.grid, fields, options, executor, control);
+  ChainPictures pictures;
+  for (std::size_t f = 0; f < fields.size(); ++f) {
+    pictures[fields[f]] = {pixels.x(), pixels.y(), std::move(flux[f])};
+  }
+  return pictures;
+}
 
 PointLight point_light(const NamedSurface& designed, const FluxPicture& blurred,
                        const FieldRenderSetup& setup, const PictureJudge& judge,
@@ -165,6 +184,10 @@ std::vector<CausePart> parts_of(const LeakageResult& result) {
     before = &result.point->designed.quality;
     add(leak_cause::kSource, result.designed.quality, 0.0);
   }
+  if (result.rays) {
+    before = &result.rays->quality;
+    add(leak_cause::kDiffraction, result.designed.quality, 0.0);
+  }
   for (const RenderedSurface& step : result.steps) {
     add(step.name, step.quality, step.quality.leakage - before->leakage);
   }
@@ -188,33 +211,83 @@ std::vector<double> surplus(const FluxPicture& part, const FluxPicture& designed
   return excess;
 }
 
+namespace {
+
+void require_pixels(const Image& target, const OpticalSetup& optics) {
+  LF_CHECK(target.columns() == optics.pixels.x() && target.rows() == optics.pixels.y(),
+           std::to_string(target.columns()) + "x" + std::to_string(target.rows()));
+}
+
+/// Judges the pictures of a chain; other surfaces without a picture are left out.
+LeakageResult judged(const LeakageChain& chain, const ChainPictures& pictures,
+                     const PictureJudge& judge) {
+  LeakageResult result;
+  const auto rendered = [&](const NamedSurface& surface) {
+    RenderedSurface one{surface.name, pictures.at(surface.field), {}};
+    one.quality = judge.judge(one.picture);
+    return one;
+  };
+  result.designed = rendered(chain.designed);
+  for (const NamedSurface& step : chain.steps) result.steps.push_back(rendered(step));
+  for (const NamedSurface& other : chain.others) {
+    if (pictures.contains(other.field)) result.others.push_back(rendered(other));
+  }
+  result.dark = judge.dark();
+  result.dark_pixels = judge.dark_pixels();
+  result.bright_pixels = judge.bright_pixels();
+  return result;
+}
+
+}  // namespace
+
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
                               const Executor& executor, const RunControl& control) {
   validate(options);
   LF_CHECK(!chain.steps.empty(), chain.designed.name);
-  LF_CHECK(target.columns() == setup.optics.pixels.x() && target.rows() == setup.optics.pixels.y(),
-           std::to_string(target.columns()) + "x" + std::to_string(target.rows()));
-  const ChainPictures pictures(chain, setup, executor, control);
-  LeakageResult result;
-  result.designed = {chain.designed.name, pictures.of(chain.designed), {}};
-  const PictureJudge judge(target, result.designed.picture, options);
-  result.designed.quality = judge.judge(result.designed.picture);
+  require_pixels(target, setup.optics);
+  const ChainPictures pictures = pictures_by_rays(chain, setup, executor, control);
+  const FluxPicture& designed = pictures.at(chain.designed.field);
+  const PictureJudge judge(target, designed, options);
+  LeakageResult result = judged(chain, pictures, judge);
   if (!setup.optics.extent.none()) {
-    result.point =
-        point_light(chain.designed, result.designed.picture, setup, judge, executor, control);
+    result.point = point_light(chain.designed, designed, setup, judge, executor, control);
   }
-  const auto add = [&](const NamedSurface& surface, std::vector<RenderedSurface>& to) {
-    to.push_back({surface.name, pictures.of(surface), {}});
-    to.back().quality = judge.judge(to.back().picture);
-  };
-  for (const NamedSurface& step : chain.steps) add(step, result.steps);
-  for (const NamedSurface& other : chain.others) add(other, result.others);
   result.parts = parts_of(result);
-  result.dark = judge.dark();
-  result.dark_pixels = judge.dark_pixels();
-  result.bright_pixels = judge.bright_pixels();
   return result;
+}
+
+LightChoice light_choice(const FieldRenderSetup& setup, LightModel asked, bool creases,
+                         double wavelength) {
+  if (creases) {
+    return {false, "by rays: the part has creases, which a wave does not show as rays do"};
+  }
+  if (asked == LightModel::kRays) return {false, "by rays, as asked"};
+  const std::vector<PictureBlur> blurs =
+      light_blurs(setup.optics, setup.surface_height, wavelength);
+  if (asked == LightModel::kWaves) return {true, "by waves, as asked"};
+  if (blurs[0].pixels <= kWideSource * blurs[1].pixels) return {true, "by waves"};
+  return {false,
+          joined({"by rays: the lamp's image is ", decimal_text(blurs[0].pixels, 1),
+                  " pixels wide, and diffraction blurs ", decimal_text(blurs[1].pixels, 1)})};
+}
+
+WaveLeakage measure_waves(const LeakageChain& chain, const RenderedSurface& rays,
+                          const Image& target, const FieldRenderSetup& setup,
+                          const LeakageOptions& options, double wavelength, double scatter,
+                          const Executor& executor, const RunControl& control) {
+  validate(options);
+  require_pixels(target, setup.optics);
+  WaveOptions waves;
+  waves.wavelength = wavelength;
+  waves.scatter = scatter;
+  const ChainPictures pictures = pictures_by_waves(chain, setup, waves, executor, control);
+  const FluxPicture& designed = pictures.at(chain.designed.field);
+  WaveLeakage measured{judged(chain, pictures, PictureJudge(target, designed, options)), wavelength,
+                       diffraction_width(setup.optics, setup.surface_height, wavelength)};
+  measured.result.rays = rays;
+  measured.result.parts = parts_of(measured.result);
+  return measured;
 }
 
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "cam/leakage/leakage.h"
-#include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
+#include "core/lens/surface_field.h"
 #include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "cam/milled/creases.h"
-#include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
+#include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
 #include "core/optics/outline.h"

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "cam/contact/cut_surface.h"
-#include "cam/milled/surface_field.h"
 #include "core/lens/optical_surface.h"
+#include "core/lens/surface_field.h"
 #include "core/mesh/surface_mesh.h"
 
 namespace lensforge {

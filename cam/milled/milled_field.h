@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cam/milled/ball_sweep.h"
-#include "cam/milled/surface_field.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 

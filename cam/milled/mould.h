@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cam/milled/surface_field.h"
+#include "core/lens/surface_field.h"
 #include "core/mesh/surface_mesh.h"
 
 namespace lensforge {

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/surface_field.h"
 #include "cam/workshop/workshop.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 

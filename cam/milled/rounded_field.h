@@ -12,8 +12,8 @@
 #include "cam/contact/drop_cutter.h"
 #include "cam/contact/smooth_roll.h"
 #include "cam/milled/designed_field.h"
-#include "cam/milled/surface_field.h"
 #include "core/compute/executor.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 

@@ -12,6 +12,7 @@
 #include "cam/plan/finishing.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/lens/optical_surface.h"
 #include "core/schema/description.h"
 #include "core/text/number_text.h"
@@ -403,6 +404,13 @@ void describe_prediction(Description& d, CamOptions& o, const Description& shop)
   d.without("--no-render", o.render, "programs only, without the predicted picture").essential =
       true;
   d.without("--no-remedies", o.remedies, "do not try what helps where most light leaks");
+  d.word(
+      "--light-model", o.light,
+      {{"auto", LightModel::kAuto}, {"rays", LightModel::kRays}, {"waves", LightModel::kWaves}},
+      "the picture that is judged, by waves or by rays alone; auto: waves unless the lamp's image "
+      "is much wider than diffraction, or the surface has creases");
+  d.number("--wavelength", o.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength), "NM",
+           "of the waves; white light is as 550");
   d.whole("--tolerances", o.tolerances,
           Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
           "how sure the forecast is: predict so many parts with the errors of the workshop's "

@@ -74,6 +74,8 @@ struct CamOptions {
   /// Of the rendered surface, mm, 0.001 … 1; 0: the larger of a sixth of the pitch and a third of
   /// the polish's σ.
   double sample_spacing = 0.0;
+  LightModel light = LightModel::kAuto;  ///< Of the picture that the verdict judges.
+  double wavelength_nm = 550.0;          ///< Of waves, for a lens without a spectrum.
   LeakageOptions leakage;
   CutLimits limits;
   std::set<std::string> stated_limits;  ///< Keys of CutLimits that are limits, not advice.

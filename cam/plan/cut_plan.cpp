@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/lens/continued_surface.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -77,6 +78,11 @@ CutSetup cut_setup(const Lens& lens, const CamOptions& options) {
   setup.options = options;
   setup.mould_lens = mould_to_cut(lens, options);
   setup.model = model_to_cut(lens, options);
+  if (options.light == LightModel::kWaves && setup.is_creased()) {
+    throw InputError(joined({"--light-model waves: the part has creases, ",
+                             setup.model == SurfaceModel::kFacet ? "those of facets" : "unpolished",
+                             ", which a wave does not show as rays do; use auto or rays"}));
+  }
   setup.apron = apron_to_cut(options);
   const Lens& part = setup.mould_lens ? *setup.mould_lens : lens;
   setup.field = inspect_height_field(part.surface, size_to_cut(options, lens.setup));

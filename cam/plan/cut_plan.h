@@ -40,6 +40,10 @@ struct CutSetup {
   /// frame of its own.
   std::shared_ptr<const OpticalSurface> optical;
 
+  /// True if the part's surfaces have creases: facets, or without polish the cusps between rows.
+  [[nodiscard]] bool is_creased() const {
+    return model == SurfaceModel::kFacet || options.workshop.polish.sigma == 0.0;
+  }
   /// Mesh of the surface to cut.
   [[nodiscard]] const SurfaceMesh& mesh() const { return optical->mesh(); }
   /// Frame of the lens in the mould, if there is one.
@@ -71,7 +75,8 @@ struct CutSetup {
 Eigen::AlignedBox3d box_to_cut(const Lens& lens, const CamOptions& options);
 
 /// @param lens  must outlive the setup. @pre validate(options, lens.setup) passed.
-/// @throw InputError naming the surface if it is no height field over the lens's rectangle.
+/// @throw InputError naming the surface if it is no height field over the lens's rectangle, or the
+///        light model if it is waves and the surface has creases.
 CutSetup cut_setup(const Lens& lens, const CamOptions& options);
 
 /// What the tools follow.

@@ -12,8 +12,8 @@
 
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled/designed_field.h"
-#include "cam/milled/surface_field.h"
 #include "core/lens/continued_surface.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 namespace {
@@ -133,6 +133,16 @@ LeakageChain PartSurfaces::chain() const {
   chain.others = {{surface_name::kRounded, raw_[1]},
                   {surface_name::kMilled, raw_.back()},
                   {surface_name::kPolished, &part()}};
+  return chain;
+}
+
+LeakageChain PartSurfaces::short_chain() const {
+  LeakageChain chain = this->chain();
+  const auto chord =
+      std::find_if(chain.steps.begin(), chain.steps.end(),
+                   [](const NamedSurface& step) { return step.name == leak_cause::kChord; });
+  chain.steps.erase(chord, chain.steps.end());
+  chain.steps.push_back({leak_cause::kPath, &part()});
   return chain;
 }
 

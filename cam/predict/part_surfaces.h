@@ -14,12 +14,12 @@
 #include "cam/milled/mould.h"
 #include "cam/milled/polished_field.h"
 #include "cam/milled/rounded_field.h"
-#include "cam/milled/surface_field.h"
 #include "cam/plan/cut_plan.h"
 #include "cam/plan/finishing.h"
 #include "core/compute/executor.h"
 #include "core/image/rasters.h"
 #include "core/lens/optical_surface.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 
@@ -58,6 +58,8 @@ class PartSurfaces {
   PartSurfaces(const Design& design, FinishPaths paths, const PolishModel& polish);
 
   [[nodiscard]] LeakageChain chain() const;
+  /// The same with the path's causes in one, for waves, whose pictures take longer.
+  [[nodiscard]] LeakageChain short_chain() const;
   [[nodiscard]] const SurfaceField& designed() const { return design_.surface; }
   [[nodiscard]] const SurfaceField& rounded() const { return *raw_[1]; }
   [[nodiscard]] const SurfaceField& milled() const { return *raw_.back(); }

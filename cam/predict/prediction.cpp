@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,7 +15,6 @@
 #include "cam/milled/milled_field.h"
 #include "cam/milled/mould.h"
 #include "cam/milled/polished_field.h"
-#include "cam/milled/surface_field.h"
 #include "cam/plan/cut_plan.h"
 #include "cam/plan/finishing.h"
 #include "cam/predict/part_surfaces.h"
@@ -24,12 +24,14 @@
 #include "core/compute/executor.h"
 #include "core/error.h"
 #include "core/lens/lens.h"
+#include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
 #include "core/optics/outline.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 namespace {
@@ -42,6 +44,34 @@ constexpr double kLeakCell = 1.0;
 constexpr double kViewNodes = 240.0;
 
 constexpr double kMicrometres = 1e3;
+constexpr double kMmPerNm = 1e-6;
+
+/// A cut's first order of diffraction goes to λ / pitch from its rays; with its own width, this
+/// much farther.
+constexpr double kOrderWidth = 1.2;
+
+/// Full width at half maximum of a Gaussian, in its σ.
+constexpr double kFullWidth = 2.355;
+
+/// Blurs of the light, of the polish, which moves the picture's detail like the lens's, and of the
+/// ripple that polish leaves of the rows: twice as far as its steepest slope moves a ray. Of a
+/// parabola's p²/(8 R) the ripple's amplitude is p²/(2π² R).
+std::vector<PictureBlur> blurs_of(const OpticalSetup& setup, const CamOptions& options,
+                                  const Passes& passes, double height, double wavelength) {
+  std::vector<PictureBlur> blurs = light_blurs(setup, height, wavelength);
+  const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
+  const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();
+  const double sigma = options.workshop.polish.sigma;
+  blurs.push_back({"polish", kFullWidth * sigma * enlarged / pixel.minCoeff()});
+  constexpr double kPi = std::numbers::pi;
+  const double k = 2.0 * kPi / passes.pitch;
+  const double amplitude = passes.pitch * passes.pitch /
+                           (2.0 * kPi * kPi * finishing_ball(options).radius()) *
+                           std::exp(-0.5 * std::pow(k * sigma, 2));
+  const double moved = LightPath(setup).reach(2.0 * k * amplitude, height);
+  blurs.push_back({"pitch", moved / pixel.minCoeff()});
+  return blurs;
+}
 
 /// Samples a whole surface coarsely.
 SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double spacing,
@@ -82,7 +112,8 @@ ReportMap height_map(const LeakMap& map) {
 }  // namespace
 
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Passes& passes, const Executor& executor, const RunControl& control) {
+                        const Passes& passes, bool creased, const Executor& executor,
+                        const RunControl& control) {
   Prediction result;
   LeakageChain chain = surfaces.chain();
   const Eigen::Vector2d spacings = sample_spacings(options, lens.setup, passes);
@@ -106,6 +137,15 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
     if (&field == &surfaces.rounded()) creases.add(tile, patch, executor);
   };
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
+  const double wavelength = middle_wavelength(lens.setup, kMmPerNm * options.wavelength_nm);
+  const LightChoice light = light_choice(setup, options.light, creased, wavelength);
+  result.light_words = light.words;
+  result.blurs = blurs_of(lens.setup, options, passes, setup.surface_height, wavelength);
+  if (light.waves) {
+    result.waves = measure_waves(surfaces.short_chain(), result.leakage.designed, lens.target,
+                                 setup, options.leakage, wavelength,
+                                 kOrderWidth * wavelength / passes.pitch, executor, control);
+  }
   result.sampling = check_sampling(chain, result.leakage, lens.target, setup, executor, control);
   const std::vector<double> weights =
       pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
@@ -536,8 +576,8 @@ Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const Cut
                        const Executor& executor, const RunControl& control) {
   const CamOptions& options = setup.options;
   const PartSurfaces& surfaces = cut.surfaces();
-  Prediction prediction =
-      predict_part(surfaces, *setup.lens, options, setup.passes(), executor, control);
+  Prediction prediction = predict_part(surfaces, *setup.lens, options, setup.passes(),
+                                       setup.is_creased(), executor, control);
   if (options.remedies) {
     try_remedies({setup, passes, surfaces.part(), prediction.leakage}, prediction.places, executor,
                  control);

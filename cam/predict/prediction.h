@@ -5,12 +5,13 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "cam/contact/cut_surface.h"
 #include "cam/leakage/leakage.h"
 #include "cam/milled/creases.h"
-#include "cam/milled/surface_field.h"
 #include "cam/path/operation.h"
 #include "cam/plan/cam_options.h"
 #include "cam/plan/cut_plan.h"
@@ -20,31 +21,42 @@
 #include "core/compute/executor.h"
 #include "core/image/rasters.h"
 #include "core/lens/lens.h"
+#include "core/lens/surface_field.h"
 #include "core/mesh/surface_mesh.h"
+#include "core/optics/optical_setup.h"
 
 namespace lensforge {
 
 /// Prediction of a part before it is cut.
 struct Prediction {
-  LeakageResult leakage;
-  SamplingCheck sampling;         ///< Of the part.
-  std::vector<LeakPlace> places;  ///< Places that leak most, worst first.
+  LeakageResult leakage;             ///< By rays.
+  std::optional<WaveLeakage> waves;  ///< Where the light model asks for them.
+  std::string light_words;           ///< By what the part is judged, and why.
+  std::vector<PictureBlur> blurs;    ///< Of light and part.
+  SamplingCheck sampling;            ///< Of the part.
+  std::vector<LeakPlace> places;     ///< Places that leak most, worst first.
   CreaseMap creases;
   ReportMap height;              ///< Part − designed, µm.
   LensRaster surface;            ///< Heights of the part, mm.
   SurfaceMesh milled;            ///< The surface as milled, at kMeshSpacing.
   LayeredImage surfaces;         ///< Designed but polished, and the part: PartLayers.
   ToleranceForecast tolerances;  ///< Empty unless requested.
+
+  /// By what the part is judged.
+  [[nodiscard]] const LeakageResult& judged() const { return waves ? waves->result : leakage; }
 };
 
 /// Spacing of the nodes of milled.ply, mm: 100 mm take 1 million.
 inline constexpr double kMeshSpacing = 0.1;
 
-/// Renders every surface from the design to the polished part and finds where light leaks. Memory
-/// does not grow with the number of samples. @throw Interrupted
-/// @param passes  on the lens.
+/// Renders every surface from the design to the polished part and finds where light leaks, by rays
+/// and, where the light model asks for it, by waves. Memory does not grow with the number of
+/// samples. @throw Interrupted
+/// @param passes   on the lens.
+/// @param creased  CutSetup::is_creased()
 Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Passes& passes, const Executor& executor, const RunControl& control);
+                        const Passes& passes, bool creased, const Executor& executor,
+                        const RunControl& control);
 
 /// A predicted cut, for trying its places again.
 struct TrialSite {

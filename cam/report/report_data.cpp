@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/report/report_data.h"
 
+#include <cctype>
+#include <string>
 #include <utility>
+#include <vector>
+
+#include "core/text/words.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 
@@ -58,6 +64,19 @@ void PathSketch::thin_out() {
   }
   kept_.strips = std::move(half);
   kept_.every *= 2;
+}
+
+std::string ReportData::judged_words() const {
+  const std::string words = "Judged " + light_words + ".";
+  if (blurs.empty()) return words;
+  const std::string blur = blur_words(blurs);
+  const std::string sentence =
+      words + " " + static_cast<char>(std::toupper(static_cast<unsigned char>(blur.front()))) +
+      blur.substr(1);
+  const PictureBlur& most = widest(blurs);
+  if (most.pixels < kNoBlur) return sentence + ".";
+  return joined({sentence, "; the widest, ", most.cause, ", would be less with ",
+                 blur_remedy(most.cause), "."});
 }
 
 double ReportData::minutes() const {

@@ -137,10 +137,13 @@ struct ReportData {
   std::string lens_id;  ///< Fingerprint of the design; left out if empty.
   std::string part;     ///< "lens", "mirror" or "mould"
 
-  Image target;                     ///< Linear light.
-  LeakageResult leakage;            ///< designed, chain and the other surfaces.
-  SamplingCheck sampling;           ///< Of the part.
-  std::vector<ShownSurface> shown;  ///< Their pictures are shown side by side.
+  Image target;                      ///< Linear light.
+  LeakageResult leakage;             ///< By rays: designed, chain and the other surfaces.
+  std::optional<WaveLeakage> waves;  ///< By waves: designed and chain.
+  std::string light_words;           ///< By what the part is judged, and why.
+  std::vector<PictureBlur> blurs;    ///< Of light and part, the light's first.
+  SamplingCheck sampling;            ///< Of the part.
+  std::vector<ShownSurface> shown;   ///< Their pictures are shown side by side.
   LeakageOptions leakage_options;
   Body body;                            ///< Of the part, or of the cast from a mould.
   double ghost = 0.0;                   ///< ghost_share(); 0 if no light passes the part.
@@ -165,6 +168,11 @@ struct ReportData {
   std::vector<ReportChoice> choices;
 
   [[nodiscard]] double minutes() const;
+  /// By what the part is judged and why, and what blurs its picture. "Judged by waves. Diffraction
+  /// blurs 1.0 pixels, polish 0.4; the widest, diffraction, would be less with a nearer wall."
+  [[nodiscard]] std::string judged_words() const;
+  /// By what the part is judged.
+  [[nodiscard]] const LeakageResult& judged() const { return waves ? waves->result : leakage; }
   /// The lit part: "lens", or the cast from the mould.
   [[nodiscard]] std::string lit_part() const {
     const std::string kind = traits(body).name;

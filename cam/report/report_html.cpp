@@ -46,6 +46,21 @@ std::string surface_figure(const RenderedSurface& surface, const std::string& wo
                      caption(surface.name, note));
 }
 
+/// What the wall shows, where that is not the picture of rays.
+std::string wave_figures(const ReportData& data) {
+  if (!data.waves) return "";
+  const auto figure = [&](RenderedSurface surface, const std::string& words) {
+    surface.name += ", by waves";
+    return surface_figure(surface, words, data.target);
+  };
+  const LeakageResult& result = data.waves->result;
+  std::string figures = figure(result.designed, "what diffraction leaves of it");
+  for (const RenderedSurface& part : result.others) {
+    figures += figure(part, "the finished part on the wall");
+  }
+  return figures;
+}
+
 std::string leakage_figure(const LeakageResult& result) {
   const std::vector<double> map = surplus(result.part().picture, result.designed.picture);
   const FluxPicture& part = result.part().picture;
@@ -127,7 +142,9 @@ std::string pictures(const ReportData& data) {
                                     [&](const auto& one) { return one.name == surface->name; });
     if (shown != data.shown.end()) figures += surface_figure(*surface, shown->words, data.target);
   }
-  return element("div", "class=\"pictures\"", figures + leakage_figure(data.leakage)) +
+  figures += wave_figures(data);
+  return element("div", "class=\"pictures\"", figures + leakage_figure(data.judged())) +
+         element("p", "class=\"soft\"", escape_html(data.judged_words())) +
          sampling_sentence(data.sampling);
 }
 

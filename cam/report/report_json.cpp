@@ -16,6 +16,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr double kNmPerMm = 1e6;
+
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json pair(const Eigen::Vector2d& v) { return {v.x(), v.y()}; }
@@ -57,8 +59,7 @@ json cause_json(const CausePart& part) {
           {"dark_over_bright", part.dark_ratio}};
 }
 
-json leakage_json(const ReportData& data) {
-  const LeakageResult& result = data.leakage;
+json leakage_json(const ReportData& data, const LeakageResult& result) {
   const PictureQuality& part = result.part().quality;
   json object{{"share", part.leakage},
               {"dark_flux", part.dark_flux},
@@ -75,6 +76,9 @@ json leakage_json(const ReportData& data) {
                                          {"dark_flux", sharp.dark_flux},
                                          {"dark_over_bright", sharp.dark_ratio}};
     object["moved_by_source"] = result.point->moved;
+  }
+  if (result.rays) {
+    object["moved_by_diffraction"] = leakage_share(result.designed.picture, result.rays->picture);
   }
   return object;
 }
@@ -256,9 +260,21 @@ json report_json(const ReportData& data) {
               {"warnings", data.warnings},
               {"seconds", data.seconds}};
   if (!data.leakage.steps.empty()) {
-    report["leakage"] = leakage_json(data);
+    report["leakage"] = leakage_json(data, data.leakage);
     report["sampling"] = sampling_json(data.sampling);
     report["surfaces"] = surfaces_json(data.leakage);
+    const auto blur = [](const PictureBlur& one) {
+      return json{{"cause", one.cause}, {"pixels", one.pixels}};
+    };
+    report["light"] = {{"model", data.waves ? "waves" : "rays"},
+                       {"words", data.light_words},
+                       {"blur", list(data.blurs, blur)}};
+    if (data.waves) {
+      report["waves"] = {{"wavelength_nm", kNmPerMm * data.waves->wavelength},
+                         {"diffraction_mm", data.waves->width},
+                         {"leakage", leakage_json(data, data.waves->result)},
+                         {"surfaces", surfaces_json(data.waves->result)}};
+    }
     if (!data.tolerances.empty()) report["tolerances"] = tolerances_json(data.tolerances);
   }
   return report;

@@ -189,7 +189,7 @@ std::string signed_decimal(double value, int decimals) {
 constexpr const char* kNoLeakage = "–";
 
 Row cause_row(const CausePart& part) {
-  const bool counts = part.cause != leak_cause::kSource;
+  const bool counts = part.cause != leak_cause::kSource && part.cause != leak_cause::kDiffraction;
   return {escape_html(part.cause), counts ? signed_percent(part.leakage) : kNoLeakage,
           signed_percent(part.dark_flux), signed_decimal(part.dark_ratio, 5)};
 }
@@ -197,6 +197,11 @@ Row cause_row(const CausePart& part) {
 /// First row of the table, to which the causes are added.
 Row first_row(const LeakageResult& result) {
   const PictureQuality& designed = result.designed.quality;
+  if (result.rays) {
+    const PictureQuality& rays = result.rays->quality;
+    return {"as designed, by rays", kNoLeakage, percent_text(rays.dark_flux),
+            decimal_text(rays.dark_ratio, 5)};
+  }
   if (!result.point) {
     return {"as designed", percent_text(designed.leakage), percent_text(designed.dark_flux),
             decimal_text(designed.dark_ratio, 5)};
@@ -206,10 +211,10 @@ Row first_row(const LeakageResult& result) {
           decimal_text(sharp.dark_ratio, 5)};
 }
 
-std::string cause_table(const ReportData& data) {
-  const PictureQuality& last = data.leakage.part().quality;
-  std::vector<Row> rows{first_row(data.leakage)};
-  for (const CausePart& part : data.leakage.parts) rows.push_back(cause_row(part));
+std::string cause_table(const LeakageResult& result) {
+  const PictureQuality& last = result.part().quality;
+  std::vector<Row> rows{first_row(result)};
+  for (const CausePart& part : result.parts) rows.push_back(cause_row(part));
   const auto bold = [](const std::string& html) { return element("b", "", html); };
   rows.push_back({bold("the part"), bold(percent_text(last.leakage)),
                   bold(percent_text(last.dark_flux)), bold(decimal_text(last.dark_ratio, 5))});
@@ -394,6 +399,16 @@ std::string source_words(const LeakageResult& result) {
          "but what the part adds to it.";
 }
 
+/// Describes what the picture by waves adds to that by rays.
+std::string wave_words(const ReportData& data) {
+  if (!data.waves) return "";
+  const LeakageResult& result = data.waves->result;
+  return " By waves diffraction moves " +
+         percent_text(leakage_share(result.designed.picture, result.rays->picture)) +
+         " of the light to where rays would put less. Leakage does not count that, but what the "
+         "part adds to it; “path” are chords, decimals and the pitch error together.";
+}
+
 std::string leakage(const ReportData& data) {
   if (data.leakage.steps.empty()) return "";
   const LeakageOptions& o = data.leakage_options;
@@ -405,11 +420,18 @@ std::string leakage(const ReportData& data) {
       count_text(data.leakage.bright_pixels) +
       "). Contrast is the bright pixels’ mean to the dark ones’. Each cause is what it adds to "
       "those above it; polishing is in every line, so the causes sum to the part." +
-      source_words(data.leakage) + part_words(data);
+      source_words(data.leakage) + wave_words(data) + part_words(data);
+  const auto tables = [](const LeakageResult& result) {
+    return quality_table(result) +
+           element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") + cause_table(result);
+  };
+  const std::string model = element("p", "", escape_html(data.judged_words()));
+  const std::string about = element("p", "class=\"soft\"", escape_html(words));
+  if (!data.waves) return html_section("Light and leakage", model + tables(data.leakage) + about);
   return html_section("Light and leakage",
-                      quality_table(data.leakage) +
-                          element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") +
-                          cause_table(data) + element("p", "class=\"soft\"", escape_html(words)));
+                      model + tables(data.waves->result) +
+                          element("h3", "style=\"margin-top:1.2rem\"", "By rays") +
+                          tables(data.leakage) + about);
 }
 
 std::string choices(const ReportData& data) {

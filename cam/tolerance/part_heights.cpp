@@ -6,8 +6,8 @@
 #include <string>
 
 #include "cam/milled/creases.h"
-#include "cam/milled/surface_field.h"
 #include "core/error.h"
+#include "core/lens/surface_field.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {

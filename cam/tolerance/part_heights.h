@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "cam/milled/surface_field.h"
 #include "cam/tolerance/part_error.h"
 #include "core/compute/executor.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 

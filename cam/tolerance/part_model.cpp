@@ -12,10 +12,10 @@
 
 #include "cam/leakage/surface_tile.h"
 #include "cam/milled/polished_field.h"
-#include "cam/milled/surface_field.h"
 #include "cam/tolerance/part_heights.h"
 #include "cam/tolerance/part_light.h"
 #include "cam/workshop/workshop.h"
+#include "core/lens/surface_field.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "cam/leakage/render_field.h"
-#include "cam/milled/surface_field.h"
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/part_heights.h"
 #include "cam/tolerance/part_light.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"
+#include "core/lens/surface_field.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {

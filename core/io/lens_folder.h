@@ -41,8 +41,8 @@ inline constexpr const char* kStaging = "lens";
 
 /// The subfolder that `cam` writes into, and its files other than the programs.
 inline constexpr const char* kCut = "cam";
-inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html",
-                                         "milled.ply",  "milled.png",  "leakage.png"};
+inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html", "milled.ply",
+                                         "milled.png",  "wall.png",    "leakage.png"};
 
 /// Files that `cam` writes beside kCutFiles, for a page that draws the part: its surfaces, and the
 /// picture with each cause of misdirected light.

@@ -260,4 +260,10 @@ struct LightColor {
 /// one colour: itself.
 std::vector<LightColor> light_colors(const OpticalSetup& setup);
 
+/// What blurs a picture, and by how much.
+struct PictureBlur {
+  std::string cause;    ///< "lamp", "diffraction", "polish" or "pitch".
+  double pixels = 0.0;  ///< Width of a point's light on the wall, about its full width at half.
+};
+
 }  // namespace lensforge

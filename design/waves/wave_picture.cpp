@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/waves/wave_picture.h"
 
-#include <fftw3.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <cstdint>
-#include <mutex>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -21,240 +17,14 @@
 #include "core/optics/outline.h"
 #include "core/optics/screen.h"
 #include "core/spline/control_net.h"
+#include "core/text/number_text.h"
+#include "core/text/words.h"
 #include "design/flux/flux_image.h"
 
 // Notation: q a ray's place on the starting plane, W its optical path up to there, p its direction
 // cosines along x and y, m = p / √(1 − |p|²) its slope; p0 and m0 those of the tile's mean ray.
 
 namespace lensforge {
-namespace {
-
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
-
-/// FFTW plans one transform at a time.
-std::mutex& planning() {
-  static std::mutex mutex;
-  return mutex;
-}
-
-fftw_complex* as_fftw(std::complex<double>* values) {
-  // std::complex has the layout of two doubles ([complex.numbers.general]).
-  return reinterpret_cast<fftw_complex*>(values);  // NOLINT(*-reinterpret-cast)
-}
-
-void transform(std::vector<std::complex<double>>& values, int columns, int rows, int sign) {
-  fftw_complex* const data = as_fftw(values.data());
-  fftw_plan plan = nullptr;
-  {
-    const std::lock_guard lock(planning());
-    plan = fftw_plan_dft_2d(rows, columns, data, data, sign, FFTW_ESTIMATE);
-  }
-  fftw_execute(plan);
-  const std::lock_guard lock(planning());
-  fftw_destroy_plan(plan);
-}
-
-/// Square of the least cosine of a direction that goes on: a degree from the plane.
-constexpr double kGrazing = 3e-4;
-
-/// Vertices are moved to this part of a step, so that sides are found without rounding.
-constexpr double kParts = 1024.0;
-
-using Whole = Eigen::Matrix<std::int64_t, 2, 1>;
-
-/// A triangle's side in whole numbers: ≥ 0 inside, and nodes on it belong to it if it is a lower
-/// or a left one.
-struct Side {
-  std::int64_t a = 0, b = 0, c = 0;
-
-  Side() = default;
-  Side(const Whole& from, const Whole& to)
-      : a(from.y() - to.y()), b(to.x() - from.x()), c(-(a * from.x() + b * from.y())) {
-    if (!(a > 0 || (a == 0 && b > 0))) --c;
-  }
-  [[nodiscard]] std::int64_t at(const Whole& p) const { return a * p.x() + b * p.y() + c; }
-};
-
-/// A triangle of rays on the nodes of a field.
-class LaidTriangle {
- public:
-  LaidTriangle(const FieldPlan& plan, const std::array<PlaneField::Vertex, 3>& vertices)
-      : plan_(plan), vertices_(vertices) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      at_[k] = (vertices[k].place - plan.centre).cwiseQuotient(plan.step) + plan.middle();
-      whole_[k] = (kParts * at_[k]).array().round().matrix().cast<std::int64_t>();
-    }
-    const Whole u = whole_[1] - whole_[0];
-    const Whole v = whole_[2] - whole_[0];
-    doubled_ = u.x() * v.y() - u.y() * v.x();
-    if (doubled_ < 0) {
-      std::swap(vertices_[1], vertices_[2]);
-      std::swap(at_[1], at_[2]);
-      std::swap(whole_[1], whole_[2]);
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      sides_[k] = Side(whole_[(k + 1) % 3], whole_[(k + 2) % 3]);
-    }
-  }
-
-  [[nodiscard]] bool is_empty() const { return doubled_ == 0; }
-  /// Its box along an axis, in parts of a step.
-  [[nodiscard]] std::pair<std::int64_t, std::int64_t> range(int axis) const {
-    return std::minmax({whole_[0][axis], whole_[1][axis], whole_[2][axis]});
-  }
-  [[nodiscard]] bool contains(const Whole& p) const {
-    return sides_[0].at(p) >= 0 && sides_[1].at(p) >= 0 && sides_[2].at(p) >= 0;
-  }
-
-  /// The field at a node, inside or near it.
-  [[nodiscard]] std::complex<double> field(std::int64_t column, std::int64_t row) const {
-    constexpr auto kWholeParts = static_cast<std::int64_t>(kParts);
-    const Eigen::Vector2d node(static_cast<double>(column), static_cast<double>(row));
-    double path = 0.0;
-    double amplitude = 0.0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      // Linear interpolation errs by as much to one side as the mean of the vertices' tangent
-      // planes does to the other.
-      const double share =
-          static_cast<double>(sides_[k].at({column * kWholeParts, row * kWholeParts})) /
-          static_cast<double>(std::abs(doubled_));
-      const Eigen::Vector2d away = (node - at_[k]).cwiseProduct(plan_.step);
-      path += share * (vertices_[k].path + 0.5 * vertices_[k].cosine.dot(away));
-      amplitude += share * vertices_[k].amplitude;
-    }
-    const Eigen::Vector2d from_centre = (node - plan_.middle()).cwiseProduct(plan_.step);
-    const double beyond_fold = doubled_ < 0 ? 0.5 * std::numbers::pi : 0.0;
-    const double phase =
-        kTwoPi / plan_.wavelength * (path - plan_.cosine.dot(from_centre)) - beyond_fold;
-    return std::polar(std::max(amplitude, 0.0), phase);
-  }
-
- private:
-  const FieldPlan& plan_;
-  std::array<PlaneField::Vertex, 3> vertices_;  ///< Counter-clockwise.
-  std::array<Eigen::Vector2d, 3> at_;           ///< In steps from the first node.
-  std::array<Whole, 3> whole_;                  ///< In parts of steps.
-  std::array<Side, 3> sides_;                   ///< Opposite to the vertices.
-  std::int64_t doubled_ = 0;                    ///< Twice the area; < 0 if it is turned over.
-};
-
-}  // namespace
-
-int transform_size(double least) {
-  for (int size = 2 * static_cast<int>(std::ceil(0.5 * std::max(least, 8.0)));; size += 2) {
-    int rest = size;
-    for (const int factor : {2, 3, 5, 7}) {
-      while (rest % factor == 0) rest /= factor;
-    }
-    if (rest == 1) return size;
-  }
-}
-
-PlaneField::PlaneField(const FieldPlan& plan)
-    : plan_(plan),
-      values_(static_cast<std::size_t>(plan.columns) * static_cast<std::size_t>(plan.rows)) {}
-
-void PlaneField::add(const std::array<Vertex, 3>& vertices) {
-  const LaidTriangle triangle(plan_, vertices);
-  if (triangle.is_empty()) return;
-  // Point n of an axis lies at apart · n + first, in parts of a step.
-  constexpr auto kWholeParts = static_cast<std::int64_t>(kParts);
-  const Whole apart(kWholeParts / plan_.points.x(), kWholeParts / plan_.points.y());
-  const Whole first = (apart.array() - kWholeParts) / 2;
-  const auto points = [&](int axis, int count) {
-    const auto [low, high] = triangle.range(axis);
-    const std::int64_t last = std::int64_t{count} * plan_.points[axis] - 1;
-    const auto point = [&](std::int64_t place) { return (place - first[axis]) / apart[axis]; };
-    return std::pair(std::clamp<std::int64_t>(point(low), 0, last),
-                     std::clamp<std::int64_t>(point(high), -1, last));
-  };
-  const auto columns = points(0, plan_.columns);
-  const auto rows = points(1, plan_.rows);
-  const double weight = 1.0 / plan_.points.prod();
-  for (std::int64_t j = rows.first; j <= rows.second; ++j) {
-    for (std::int64_t i = columns.first; i <= columns.second; ++i) {
-      if (!triangle.contains({apart.x() * i + first.x(), apart.y() * j + first.y()})) continue;
-      const std::int64_t column = i / plan_.points.x();
-      const std::int64_t row = j / plan_.points.y();
-      at(static_cast<int>(column), static_cast<int>(row)) += weight * triangle.field(column, row);
-    }
-  }
-}
-
-/// A component of the spectrum with the direction p turns by k D √(1 − |p|²), without what the mean
-/// ray's turns by and without the shift of the nodes to far_centre().
-void PlaneField::propagate() {
-  transform(values_, plan_.columns, plan_.rows, FFTW_FORWARD);
-  const double wave_number = kTwoPi / plan_.wavelength;
-  const Eigen::Vector2d slope = plan_.slope();
-  const double root = std::sqrt(1.0 - plan_.cosine.squaredNorm());
-  const auto direction = [&](int n, int count, int axis) {
-    const int frequency = n < (count + 1) / 2 ? n : n - count;
-    return plan_.wavelength * frequency / (count * plan_.step[axis]);
-  };
-  const double scale = 1.0 / static_cast<double>(values_.size());
-  for (int j = 0; j < plan_.rows; ++j) {
-    const double q_y = direction(j, plan_.rows, 1);
-    for (int i = 0; i < plan_.columns; ++i) {
-      const Eigen::Vector2d more(direction(i, plan_.columns, 0), q_y);
-      const double square = 1.0 - (plan_.cosine + more).squaredNorm();
-      std::complex<double>& value = at(i, j);
-      const double far = plan_.distance / std::sqrt(std::max(square, kGrazing));
-      const Eigen::Vector2d aside = far * (plan_.cosine + more) - plan_.distance * slope;
-      if (square <= kGrazing || (aside.cwiseAbs().array() > plan_.reach.array()).any()) {
-        value = 0.0;
-        continue;
-      }
-      // √s − √s0 without cancellation.
-      const double longer = (square - root * root) / (std::sqrt(square) + root);
-      value *= std::polar(scale, wave_number * plan_.distance * (longer + slope.dot(more)));
-    }
-  }
-  transform(values_, plan_.columns, plan_.rows, FFTW_BACKWARD);
-}
-
-PixelLight PlaneField::spread(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
-                              const Eigen::Vector2i& pixels) const {
-  const Eigen::Matrix2d by_node = by_mm * plan_.step.asDiagonal();
-  const Eigen::Vector2d cell = by_node.cwiseAbs().rowwise().sum();
-  const Eigen::Vector2d half =
-      0.5 * by_node.cwiseAbs() * Eigen::Vector2d(plan_.columns, plan_.rows) + cell;
-  PixelLight result;
-  const Eigen::Vector2i low = (centre - half).array().floor().cast<int>().max(0);
-  const Eigen::Vector2i high = (centre + half).array().ceil().cast<int>().min(pixels.array());
-  if (low.x() >= high.x() || low.y() >= high.y()) return result;
-  result.first = low;
-  result.columns = high.x() - low.x();
-  result.rows = high.y() - low.y();
-  result.light.assign(
-      static_cast<std::size_t>(result.columns) * static_cast<std::size_t>(result.rows), 0.0);
-  const double area = plan_.step.prod();
-  /// Pixels that a cell touches along one axis, and its share in each.
-  const auto touched = [&](int axis, double at, const auto& take) {
-    const double from = at - 0.5 * cell[axis];
-    const double to = at + 0.5 * cell[axis];
-    for (int pixel = std::max(low[axis], static_cast<int>(std::floor(from)));
-         pixel < high[axis] && pixel < to; ++pixel) {
-      const double share = (std::min(to, pixel + 1.0) - std::max(from, double(pixel))) / cell[axis];
-      if (share > 0.0) take(pixel - low[axis], share);
-    }
-  };
-  for (int j = 0; j < plan_.rows; ++j) {
-    for (int i = 0; i < plan_.columns; ++i) {
-      const double light = std::norm(at(i, j)) * area;
-      if (light == 0.0) continue;
-      const Eigen::Vector2d place = centre + by_node * (Eigen::Vector2d(i, j) - plan_.middle());
-      touched(1, place.y(), [&](int row, double of_row) {
-        touched(0, place.x(), [&](int column, double of_column) {
-          result.light[static_cast<std::size_t>(row) * static_cast<std::size_t>(result.columns) +
-                       static_cast<std::size_t>(column)] += light * of_row * of_column;
-        });
-      });
-    }
-  }
-  return result;
-}
-
 namespace {
 
 /// Fields are sampled this much finer than the steepest ray asks for.
@@ -283,56 +53,64 @@ constexpr double kFade = 0.8;
 /// Tiles whose light is held at the same time.
 constexpr std::int64_t kBatch = 16;
 
-/// A stretch of one axis with a window that rises at its begin and falls at its end.
+/// A stretch of one axis of the grid, in cells, with a window that rises at its begin and falls at
+/// its end.
 struct Stretch {
-  double begin, end;  ///< mm
-  double rise, fall;  ///< Widths of the ramps, mm; 0 at the lens's rim.
+  std::int64_t begin, end;
+  std::int64_t rise, fall;  ///< Widths of the ramps; 0 at the lens's rim.
 
-  [[nodiscard]] double length() const { return end - begin; }
+  [[nodiscard]] std::int64_t nodes() const { return end - begin + 1; }
   /// Squares of neighbours' windows sum to 1.
-  [[nodiscard]] double window(double at) const {
-    constexpr double kQuarter = 0.5 * std::numbers::pi;
-    double value = 1.0;
-    if (rise > 0.0 && at < begin + rise) value *= std::sin(kQuarter * (at - begin) / rise);
-    if (fall > 0.0 && at > end - fall) value *= std::sin(kQuarter * (end - at) / fall);
-    return value;
+  [[nodiscard]] double window(std::int64_t node) const {
+    const auto ramp = [](std::int64_t from_end, std::int64_t width) {
+      if (from_end >= width) return 1.0;
+      return std::sin(0.5 * std::numbers::pi * static_cast<double>(from_end) /
+                      static_cast<double>(width));
+    };
+    return ramp(node - begin, rise) * ramp(end - node, fall);
   }
-  /// Width of the ramps between its halves, mm.
-  [[nodiscard]] double middle_ramp() const {
-    const double middle = 0.5 * (begin + end);
-    return 0.5 * std::min(middle - begin - rise, end - fall - middle);
+  /// Width of the ramps between its halves.
+  [[nodiscard]] std::int64_t middle_ramp() const {
+    const std::int64_t middle = (begin + end) / 2;
+    return std::min(middle - begin - rise, end - fall - middle) / 2;
   }
   /// Both halves; their windows' squares sum to that of the whole. @pre middle_ramp() > 0.
   [[nodiscard]] std::array<Stretch, 2> halves() const {
-    const double middle = 0.5 * (begin + end);
-    const double ramp = middle_ramp();
-    return {Stretch{begin, middle + 0.5 * ramp, rise, ramp},
-            Stretch{middle - 0.5 * ramp, end, ramp, fall}};
+    const std::int64_t ramp = middle_ramp();
+    const std::int64_t second = (begin + end) / 2 - ramp / 2;
+    return {Stretch{begin, second + ramp, rise, ramp}, Stretch{second, end, ramp, fall}};
   }
 };
 
-/// @param tile, overlap  mm; 0: one stretch.
-std::vector<Stretch> stretches(double length, double tile, double overlap) {
-  const double count = tile > 0.0 ? std::max(1.0, std::round(length / tile)) : 1.0;
-  const double ramp = std::min(overlap, length / count);
-  std::vector<Stretch> all;
-  for (double k = 0.0; k < count; k += 1.0) {
-    Stretch one{length * k / count, length * (k + 1.0) / count, 0.0, 0.0};
-    if (k > 0.0) {
-      one.begin -= 0.5 * ramp;
+/// @param tile, overlap  cells; 0: one stretch.
+std::vector<Stretch> stretches(std::int64_t cells, double tile, double overlap) {
+  const auto all = static_cast<double>(cells);
+  const std::int64_t count =
+      tile > 0.0 ? std::max<std::int64_t>(1, std::llround(std::min(all, all / tile))) : 1;
+  const std::int64_t ramp =
+      std::llround(std::min(overlap, std::floor(all / static_cast<double>(count))));
+  std::vector<Stretch> parts;
+  for (std::int64_t k = 0; k < count; ++k) {
+    Stretch one{cells * k / count, cells * (k + 1) / count, 0, 0};
+    if (k > 0) {
+      one.begin -= ramp / 2;
       one.rise = ramp;
     }
-    if (k + 1.0 < count) {
-      one.end += 0.5 * ramp;
+    if (k + 1 < count) {
+      one.end += ramp - ramp / 2;
       one.fall = ramp;
     }
-    all.push_back(one);
+    parts.push_back(one);
   }
-  return all;
+  return parts;
 }
 
 struct Tile {
   Stretch x, y;
+
+  [[nodiscard]] CellRange cells() const {
+    return {x.begin, y.begin, x.end - x.begin, y.end - y.begin};
+  }
 };
 
 /// Optical path from the lamp to points of the surface, but for a constant of parallel light, mm.
@@ -364,36 +142,57 @@ class LampPath {
   Eigen::Vector3d inside_ = Eigen::Vector3d::UnitZ();  ///< Behind a flat front.
 };
 
+/// Light of one wavelength.
+struct WaveColor {
+  WaveColor(const OpticalSetup& with_pixels, double wavelength_mm, double share_of_light)
+      : setup(with_pixels),
+        light(setup),
+        path(setup),
+        screen(setup),
+        wavelength(wavelength_mm),
+        share(share_of_light) {}
+
+  OpticalSetup setup;  ///< With pixels as the source's blur requires.
+  LightPath light;
+  LampPath path;
+  Screen screen;
+  double wavelength;  ///< mm
+  double share;       ///< Of the brightness.
+};
+
 /// Common inputs of the tiles.
 struct WaveScene {
-  const OpticalSetup& setup;  ///< With pixels as the source's blur requires.
-  const WaveSurface& surface;
   const WaveOptions& options;
   const RunControl& control;
-  LightPath light;
+  std::vector<WaveColor> colors;
   std::optional<OutlineIndex> edge;  ///< Of a lens with an outline.
 };
 
 /// One tile's way from the surface to the screen.
 class WaveTile {
  public:
-  WaveTile(const WaveScene& scene, const Tile& tile)
-      : light_(scene.light),
-        path_(scene.setup),
-        screen_(scene.setup),
+  /// @param patch  the surface's nodes, of the tile and around.
+  WaveTile(const WaveScene& scene, const WaveColor& color, const SurfacePatch& patch,
+           const Tile& tile)
+      : color_(color),
         options_(scene.options),
         edge_(scene.edge ? &*scene.edge : nullptr),
-        tile_(tile) {
-    trace(scene.surface);
+        patch_(patch),
+        tile_(tile),
+        columns_(static_cast<int>(tile.x.nodes())),
+        rows_(static_cast<int>(tile.y.nodes())) {
+    trace();
   }
 
   /// True if no light leaves.
   [[nodiscard]] bool is_dark() const { return whole_ <= 0.0; }
   /// True if its quarters would show it better.
   [[nodiscard]] bool should_be_divided() const {
-    const double least = kLeastRamp * std::sqrt(options_.wavelength * plan_.distance);
+    const double least = kLeastRamp * std::sqrt(color_.wavelength * plan_.distance);
+    const Eigen::Vector2d ramps(static_cast<double>(tile_.x.middle_ramp()),
+                                static_cast<double>(tile_.y.middle_ramp()));
     return as_rays_ > kLittle * whole_ &&
-           std::min(tile_.x.middle_ramp(), tile_.y.middle_ramp()) > least;
+           ramps.cwiseProduct(patch_.window.spacing).minCoeff() > least;
   }
 
   [[nodiscard]] PixelLight light() const {
@@ -416,51 +215,53 @@ class WaveTile {
     double window = 0.0;
   };
 
-  void trace(const WaveSurface& surface) {
-    const double apart = 0.25 * options_.detail;
-    const auto count = [&](double length) {
-      return std::max(4, static_cast<int>(std::ceil(length / apart)));
-    };
-    grid_ = {
-        {tile_.x.begin, tile_.y.begin},
-        {tile_.x.length() / count(tile_.x.length()), tile_.y.length() / count(tile_.y.length())},
-        count(tile_.x.length()) + 1,
-        count(tile_.y.length()) + 1};
-    WaveSamples samples;
-    surface(grid_, samples);
+  /// Number of a node of the tile in its patch.
+  [[nodiscard]] std::size_t in_patch(int i, int j) const {
+    const GridWindow& window = patch_.window;
+    return static_cast<std::size_t>((tile_.y.begin - window.first_row + j) * window.columns +
+                                    tile_.x.begin - window.first_column + i);
+  }
+
+  void trace() {
     double sum = 0.0;
-    for (const double z : samples.z) sum += z;
-    const double level = sum / static_cast<double>(samples.z.size());
-    nodes_.resize(samples.z.size());
-    corners_.resize(samples.z.size());
-    for (int j = 0; j < grid_.rows; ++j) {
-      for (int i = 0; i < grid_.columns; ++i) trace_node(i, j, samples, level);
+    for (int j = 0; j < rows_; ++j) {
+      for (int i = 0; i < columns_; ++i) sum += patch_.z[in_patch(i, j)];
+    }
+    const std::size_t count = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
+    const double level = sum / static_cast<double>(count);
+    nodes_.resize(count);
+    corners_.resize(count);
+    for (int j = 0; j < rows_; ++j) {
+      for (int i = 0; i < columns_; ++i) trace_node(i, j, level);
     }
     weigh_triangles();
     if (!is_dark()) make_plan(level);
   }
 
-  void trace_node(int i, int j, const WaveSamples& samples, double level) {
+  void trace_node(int i, int j, double level) {
     const std::size_t k = index({i, j});
-    const Eigen::Vector2d xy = grid_.place(i, j);
-    const Eigen::Vector3d p(xy.x(), xy.y(), samples.z[k]);
-    const Eigen::Vector3d n =
-        Eigen::Vector3d(-samples.slope_x[k], -samples.slope_y[k], 1.0).normalized();
+    const std::size_t n = in_patch(i, j);
+    const LightPath& light = color_.light;
+    const Eigen::Vector2d xy = patch_.window.node(tile_.x.begin - patch_.window.first_column + i,
+                                                  tile_.y.begin - patch_.window.first_row + j);
+    const Eigen::Vector3d p(xy.x(), xy.y(), patch_.z[n]);
+    const Eigen::Vector3d normal =
+        Eigen::Vector3d(-patch_.slope_x[n], -patch_.slope_y[n], 1.0).normalized();
     std::optional<IncidentRay> ray;
-    if (light_.varies()) ray = light_.ray_to(p);
+    if (light.varies()) ray = light.ray_to(p);
     const IncidentRay* const known = ray ? &*ray : nullptr;
     corners_[k] = p;
     Node& node = nodes_[k];
-    node.lit = light_.transmits(p, n, known);
+    node.lit = light.transmits(p, normal, known);
     if (!node.lit) return;
-    node.slope = light_.beam(p, n, known).m;
+    node.slope = light.beam(p, normal, known).m;
     const double secant = std::sqrt(1.0 + node.slope.squaredNorm());
     node.cosine = node.slope / secant;
     node.q = xy + (level - p.z()) * node.slope;
-    node.path = path_.to(p, known) + (level - p.z()) * secant;
+    node.path = color_.path.to(p, known) + (level - p.z()) * secant;
     // An outline's edge fades over one step of the rays, far below √(λ f).
     const bool in = edge_ == nullptr || edge_->contains(xy);
-    node.window = in ? tile_.x.window(xy.x()) * tile_.y.window(xy.y()) : 0.0;
+    node.window = in ? tile_.x.window(tile_.x.begin + i) * tile_.y.window(tile_.y.begin + j) : 0.0;
   }
 
   /// A triangle of nodes.
@@ -469,8 +270,8 @@ class WaveTile {
 
   template <class Action>
   void for_each_triangle(const Action& action) const {
-    for (int j = 0; j + 1 < grid_.rows; ++j) {
-      for (int i = 0; i + 1 < grid_.columns; ++i) {
+    for (int j = 0; j + 1 < rows_; ++j) {
+      for (int i = 0; i + 1 < columns_; ++i) {
         action(Three{Corner{i, j}, Corner{i + 1, j}, Corner{i + 1, j + 1}});
         action(Three{Corner{i, j}, Corner{i + 1, j + 1}, Corner{i, j + 1}});
       }
@@ -478,7 +279,7 @@ class WaveTile {
   }
 
   [[nodiscard]] std::size_t index(const Corner& c) const {
-    return static_cast<std::size_t>(c[1]) * static_cast<std::size_t>(grid_.columns) +
+    return static_cast<std::size_t>(c[1]) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(c[0]);
   }
   [[nodiscard]] bool is_lit(const Three& t) const {
@@ -515,17 +316,17 @@ class WaveTile {
     mean_ = mean / whole_;
     for (std::size_t k = 0; k < amplitude_.size(); ++k) {
       // At a caustic of the starting plane itself the area vanishes, but not the light around it.
-      const double least = 1e-3 * grid_.step.prod();
+      const double least = 1e-3 * patch_.window.spacing.prod();
       amplitude_[k] = area[k] > 0.0 ? std::sqrt(amplitude_[k] / std::max(area[k], least)) : 0.0;
     }
   }
 
   [[nodiscard]] double flux_of(const Corners& t) const {
-    if (!light_.varies()) return light_.flux(t);
-    const IncidentRay a = light_.ray_to(t.v0);
-    const IncidentRay b = light_.ray_to(t.v1);
-    const IncidentRay c = light_.ray_to(t.v2);
-    return light_.flux(t, {&a, &b, &c});
+    if (!color_.light.varies()) return color_.light.flux(t);
+    const IncidentRay a = color_.light.ray_to(t.v0);
+    const IncidentRay b = color_.light.ray_to(t.v1);
+    const IncidentRay c = color_.light.ray_to(t.v2);
+    return color_.light.flux(t, {&a, &b, &c});
   }
 
   /// Share of a node's light that goes as a wave.
@@ -556,7 +357,7 @@ class WaveTile {
     for_each_ray([&](const Three& t, double flux) {
       std::array<Eigen::Vector2d, 3> places;
       for (std::size_t k = 0; k < 3; ++k) {
-        places[k] = light_.land(corners_[index(t[k])], nodes_[index(t[k])].slope);
+        places[k] = color_.light.land(corners_[index(t[k])], nodes_[index(t[k])].slope);
       }
       add_ray(places, flux, light);
     });
@@ -566,7 +367,7 @@ class WaveTile {
   void add_ray(const std::array<Eigen::Vector2d, 3>& t, double flux, PixelLight& light) const {
     const Eigen::Vector2d low = t[0].cwiseMin(t[1]).cwiseMin(t[2]);
     const Eigen::Vector2d high = t[0].cwiseMax(t[1]).cwiseMax(t[2]);
-    const Eigen::Vector2i pixels(screen_.plane().columns(), screen_.plane().rows());
+    const Eigen::Vector2i pixels(color_.screen.plane().columns(), color_.screen.plane().rows());
     if ((high.array() <= 0.0).any() || (low.array() >= pixels.cast<double>().array()).any()) return;
     if ((high - low).maxCoeff() > 0.5) {
       const std::array<Eigen::Vector2d, 3> m{0.5 * (t[0] + t[1]), 0.5 * (t[1] + t[2]),
@@ -591,15 +392,15 @@ class WaveTile {
       if (node.lit) start.extend(node.q);
     }
     const Eigen::Vector2d centre = start.center();
-    const Eigen::Vector2d landing = light_.land({centre.x(), centre.y(), level}, slope);
-    far_level_ = screen_.at(landing).z();
+    const Eigen::Vector2d landing = color_.light.land({centre.x(), centre.y(), level}, slope);
+    far_level_ = color_.screen.at(landing).z();
     const double distance = far_level_ - level;
-    const double unit = std::sqrt(options_.wavelength / distance);
+    const double unit = std::sqrt(color_.wavelength / distance);
     const auto spread_of = [&](const Stretch& axis) {
       return std::max((is_cut(axis) ? kEdgeSpread : kSpread) * unit, options_.scatter);
     };
     spread_ = {spread_of(tile_.x), spread_of(tile_.y)};
-    plan_.wavelength = options_.wavelength;
+    plan_.wavelength = color_.wavelength;
     plan_.distance = distance;
     plan_.centre = centre;
     plan_.cosine = mean_;
@@ -631,23 +432,23 @@ class WaveTile {
       if (!node.lit || as_wave(node) <= 0.0) continue;
       beyond.extend(node.q - plan_.centre + plan_.distance * (node.slope - slope));
     }
-    const double unit = std::sqrt(options_.wavelength / plan_.distance);
+    const double unit = std::sqrt(color_.wavelength / plan_.distance);
     const Eigen::Vector2d room =
         (2.0 * plan_.distance * spread_).cwiseMax(kRoom * unit * plan_.distance);
     const Eigen::Vector2d farthest = beyond.min().cwiseAbs().cwiseMax(beyond.max().cwiseAbs());
     const Eigen::Vector2d size = 2.0 * (0.5 * start.sizes()).cwiseMax(farthest) + room;
-    plan_.step = options_.wavelength / (2.0 * kFiner) * (steepest_ + spread_).cwiseInverse();
+    plan_.step = color_.wavelength / (2.0 * kFiner) * (steepest_ + spread_).cwiseInverse();
     plan_.reach = farthest + 0.5 * start.sizes() + room;
     plan_.columns = transform_size(size.x() / plan_.step.x());
     plan_.rows = transform_size(size.y() / plan_.step.y());
   }
 
   /// True if it ends at the lens's rim, where no window fades the light.
-  static bool is_cut(const Stretch& axis) { return axis.rise == 0.0 || axis.fall == 0.0; }
+  static bool is_cut(const Stretch& axis) { return axis.rise == 0 || axis.fall == 0; }
 
   /// Lays the field of every triangle on the starting plane.
   void lay(PlaneField& field) const {
-    const double reference = nodes_[index({grid_.columns / 2, grid_.rows / 2})].path;
+    const double reference = nodes_[index({columns_ / 2, rows_ / 2})].path;
     for_each_triangle([&](const Three& t) {
       if (!is_lit(t)) return;
       std::array<PlaneField::Vertex, 3> vertices;
@@ -664,25 +465,25 @@ class WaveTile {
   [[nodiscard]] PixelLight on_pixels(const PlaneField& field) const {
     const Eigen::Vector2d slope = plan_.slope();
     const auto land = [&](const Eigen::Vector2d& xy) {
-      return light_.land({xy.x(), xy.y(), far_level_}, slope);
+      return color_.light.land({xy.x(), xy.y(), far_level_}, slope);
     };
     const Eigen::Vector2d centre = plan_.far_centre();
     const Eigen::Vector2d at = land(centre);
     Eigen::Matrix2d by_mm;
     by_mm << land(centre + Eigen::Vector2d::UnitX()) - at,
         land(centre + Eigen::Vector2d::UnitY()) - at;
-    PixelLight light = field.spread(at, by_mm, {screen_.plane().columns(), screen_.plane().rows()});
+    PixelLight light =
+        field.spread(at, by_mm, {color_.screen.plane().columns(), color_.screen.plane().rows()});
     light.whole = whole_;
     return light;
   }
 
-  const LightPath& light_;
-  LampPath path_;
-  Screen screen_;
+  const WaveColor& color_;
   const WaveOptions& options_;
   const OutlineIndex* edge_;
+  const SurfacePatch& patch_;
   Tile tile_;
-  WaveGrid grid_;
+  int columns_, rows_;
   std::vector<Node> nodes_;
   std::vector<Eigen::Vector3d> corners_;
   std::vector<double> amplitude_;
@@ -697,9 +498,10 @@ class WaveTile {
 };
 
 /// A tile's light, of its quarters if its field would be too large.
-void add_light(const WaveScene& scene, const Tile& tile, std::vector<PixelLight>& parts) {
+void add_light(const WaveScene& scene, const WaveColor& color, const SurfacePatch& patch,
+               const Tile& tile, std::vector<PixelLight>& parts) {
   if (scene.control.stop_requested()) return;
-  const WaveTile whole(scene, tile);
+  const WaveTile whole(scene, color, patch, tile);
   if (whole.is_dark()) return;
   if (!whole.should_be_divided()) {
     parts.push_back(whole.light());
@@ -707,7 +509,7 @@ void add_light(const WaveScene& scene, const Tile& tile, std::vector<PixelLight>
   }
   for (const Stretch& y : tile.y.halves()) {
     for (const Stretch& x : tile.x.halves()) {
-      add_light(scene, {x, y}, parts);
+      add_light(scene, color, patch, {x, y}, parts);
     }
   }
 }
@@ -724,124 +526,229 @@ void add_to(const PixelLight& part, const Eigen::Vector2i& pixels, std::vector<d
   }
 }
 
-/// Light of a lamp's middle.
-std::vector<double> light_of_point(const WaveScene& scene, const std::vector<Tile>& tiles,
-                                   const Executor& executor) {
-  const RunControl& control = scene.control;
-  const Eigen::Vector2i& pixels = scene.setup.pixels;
-  std::vector<double> flux(static_cast<std::size_t>(pixels.prod()), 0.0);
+/// A surface's picture in one wavelength, of a lamp's middle, as far as it was summed.
+struct PointPicture {
+  std::vector<double> flux;
   double whole = 0.0;
-  const auto count = static_cast<std::int64_t>(tiles.size());
-  for (std::int64_t first = 0; first < count; first += kBatch) {
-    if (control.stop_requested()) throw Interrupted();
-    const std::int64_t size = std::min(kBatch, count - first);
-    std::vector<std::vector<PixelLight>> lights(static_cast<std::size_t>(size));
-    const auto work = [&](std::int64_t k) {
-      add_light(scene, tiles[static_cast<std::size_t>(first + k)],
-                lights[static_cast<std::size_t>(k)]);
-    };
-    parallel_for(executor, "waves", size, work, 1);
-    for (const std::vector<PixelLight>& parts : lights) {
-      for (const PixelLight& part : parts) {
-        add_to(part, pixels, flux);
-        whole += part.whole;
+
+  /// Adds its share of the brightness to a picture.
+  void add_to(const WaveColor& color, std::vector<double>& sum) const {
+    // What a lens takes in depends on its surface, but for light along z.
+    const bool all = color.light.intake_is_plan_area() || whole == 0.0;
+    const double scale = color.share / (all ? 1.0 : whole);
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += scale * flux[i];
+  }
+};
+
+/// Light of a lamp's middle from several surfaces.
+class PointLightOf {
+ public:
+  PointLightOf(const WaveScene& scene, const GridWindow& grid,
+               std::span<const SurfaceField* const> surfaces)
+      : scene_(scene),
+        grid_(grid),
+        surfaces_(surfaces),
+        pixels_(scene.colors.front().setup.pixels),
+        pictures_(surfaces.size() * scene.colors.size(),
+                  {std::vector<double>(static_cast<std::size_t>(pixels_.prod()), 0.0)}) {}
+
+  void add(const std::vector<Tile>& tiles, const Executor& executor) {
+    const auto jobs = static_cast<std::int64_t>(pictures_.size());
+    const std::int64_t batch = std::max<std::int64_t>(1, kBatch / jobs);
+    const auto count = static_cast<std::int64_t>(tiles.size());
+    for (std::int64_t first = 0; first < count; first += batch) {
+      const std::int64_t size = std::min(batch, count - first);
+      add_batch(
+          std::span(tiles).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(size)),
+          executor);
+      scene_.control.report(
+          {"waves", static_cast<double>(first + size), static_cast<double>(count), "tiles"});
+    }
+  }
+
+  /// A surface's light in all wavelengths.
+  [[nodiscard]] std::vector<double> of(std::size_t surface) const {
+    std::vector<double> sum(static_cast<std::size_t>(pixels_.prod()), 0.0);
+    for (std::size_t c = 0; c < scene_.colors.size(); ++c) {
+      pictures_[surface * scene_.colors.size() + c].add_to(scene_.colors[c], sum);
+    }
+    return sum;
+  }
+
+ private:
+  void add_batch(std::span<const Tile> tiles, const Executor& executor) {
+    const std::size_t colors = scene_.colors.size();
+    std::vector<SurfacePatch> patches(tiles.size() * surfaces_.size());
+    for (std::size_t t = 0; t < tiles.size(); ++t) {
+      for (std::size_t s = 0; s < surfaces_.size(); ++s) {
+        if (scene_.control.stop_requested()) throw Interrupted();
+        surfaces_[s]->sample(window_of(grid_, tiles[t].cells(), 0), executor,
+                             patches[t * surfaces_.size() + s]);
       }
     }
-    control.report(
-        {"waves", static_cast<double>(first + size), static_cast<double>(count), "tiles"});
+    const std::vector<std::size_t> first = first_equal(patches);
+    std::vector<std::vector<PixelLight>> lights(patches.size() * colors);
+    const auto work = [&](std::int64_t job) {
+      const auto k = static_cast<std::size_t>(job);
+      if (first[k / colors] != k / colors) return;
+      add_light(scene_, scene_.colors[k % colors], patches[k / colors],
+                tiles[k / colors / surfaces_.size()], lights[k]);
+    };
+    parallel_for(executor, "waves", static_cast<std::int64_t>(lights.size()), work, 1);
+    if (scene_.control.stop_requested()) throw Interrupted();
+    for (std::size_t k = 0; k < lights.size(); ++k) {
+      PointPicture& picture = pictures_[k % pictures_.size()];
+      for (const PixelLight& part : lights[first[k / colors] * colors + k % colors]) {
+        add_to(part, pixels_, picture.flux);
+        picture.whole += part.whole;
+      }
+    }
   }
-  if (control.stop_requested()) throw Interrupted();
-  // What a lens takes in depends on its surface, but for light along z.
-  if (scene.light.intake_is_plan_area() || whole == 0.0) return flux;
-  for (double& value : flux) value /= whole;
-  return flux;
-}
+
+  /// For every patch of a tile the first that has the same nodes: a ball changes nothing where it
+  /// reaches the surface.
+  [[nodiscard]] std::vector<std::size_t> first_equal(
+      const std::vector<SurfacePatch>& patches) const {
+    std::vector<std::size_t> first(patches.size());
+    for (std::size_t k = 0; k < patches.size(); ++k) {
+      first[k] = k - k % surfaces_.size();
+      while (first[k] < k && !same_nodes(patches[first[k]], patches[k])) ++first[k];
+    }
+    return first;
+  }
+  static bool same_nodes(const SurfacePatch& a, const SurfacePatch& b) {
+    return a.z == b.z && a.slope_x == b.slope_x && a.slope_y == b.slope_y;
+  }
+
+  const WaveScene& scene_;
+  const GridWindow& grid_;
+  std::span<const SurfaceField* const> surfaces_;
+  Eigen::Vector2i pixels_;
+  std::vector<PointPicture> pictures_;  ///< By surface, then wavelength.
+};
 
 /// Height of a surface in the middle of its lens, mm.
-double middle_height(const OpticalSetup& setup, const WaveSurface& surface) {
-  WaveSamples middle;
-  surface({0.5 * setup.lens_size, {1.0, 1.0}, 1, 1}, middle);
-  return middle.z.front();
+double middle_height(const GridWindow& grid, const SurfaceField& surface) {
+  GridWindow one = grid;
+  one.first_column += grid.columns / 2;
+  one.first_row += grid.rows / 2;
+  one.columns = 1;
+  one.rows = 1;
+  SurfacePatch patch;
+  surface.sample(one, Executor::serial(), patch);
+  return patch.z.front();
+}
+
+/// λ f: wavelength × distance from the middle of the lens to the wall, mm².
+double spot_area(const OpticalSetup& setup, double height, double wavelength) {
+  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), height);
+  return wavelength * LightPath(setup).clearance(middle);
+}
+
+/// mm on the wall.
+double pixel_width(const OpticalSetup& setup) {
+  return setup.image_size.cwiseQuotient(setup.pixels.cast<double>()).minCoeff();
 }
 
 /// Distance on the lens up to which waves interfere in a pixel's mean, λ f / pixel, and at least
 /// √(λ f), to which diffraction reaches, mm.
 double coherence_length(const OpticalSetup& setup, double height, double wavelength) {
-  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), height);
-  const double spot = wavelength * LightPath(setup).clearance(middle);
-  const double pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>()).minCoeff();
-  return std::max(std::sqrt(spot), spot / pixel);
+  const double spot = spot_area(setup, height, wavelength);
+  return std::max(std::sqrt(spot), spot / pixel_width(setup));
+}
+
+constexpr double kMmPerNm = 1e-6;
+
+/// The wavelengths of a setup's light, shortest first.
+std::vector<WaveColor> wave_colors(const OpticalSetup& setup, double wavelength) {
+  std::vector<WaveColor> colors;
+  for (const LightColor& color : light_colors(setup)) {
+    const std::size_t k = colors.size();
+    const bool one = setup.spectrum.none();
+    colors.emplace_back(color.setup, one ? wavelength : kMmPerNm * setup.spectrum.wavelengths[k],
+                        color.share);
+  }
+  return colors;
 }
 
 }  // namespace
 
-std::vector<double> wave_flux(const OpticalSetup& setup, const WaveSurface& surface,
-                              const WaveOptions& options, const Executor& executor,
-                              const RunControl& control) {
-  const double height = middle_height(setup, surface);
+double middle_wavelength(const OpticalSetup& setup, double otherwise) {
+  const std::vector<double>& all = setup.spectrum.wavelengths;
+  return all.empty() ? otherwise : kMmPerNm * all[all.size() / 2];
+}
+
+double diffraction_width(const OpticalSetup& setup, double z, double wavelength) {
+  return std::sqrt(spot_area(setup, z, wavelength));
+}
+
+std::vector<PictureBlur> light_blurs(const OpticalSetup& setup, double z, double wavelength) {
+  const double diffraction = diffraction_width(setup, z, wavelength) / pixel_width(setup);
+  return {{"lamp", source_blur(setup, z)}, {"diffraction", diffraction}};
+}
+
+const PictureBlur& widest(const std::vector<PictureBlur>& blurs) {
+  return *std::max_element(
+      blurs.begin(), blurs.end(),
+      [](const PictureBlur& a, const PictureBlur& b) { return a.pixels < b.pixels; });
+}
+
+std::string blur_words(const std::vector<PictureBlur>& blurs) {
+  std::string text;
+  for (const PictureBlur& blur : blurs) {
+    if (blur.pixels < kNoBlur) continue;
+    const std::string width = decimal_text(blur.pixels, 1);
+    text += joined({text.empty() ? "" : ", ", blur.cause, text.empty() ? " blurs " : " ", width,
+                    text.empty() ? " pixels" : ""});
+  }
+  return text.empty() ? "nothing blurs the picture" : text;
+}
+
+const char* blur_remedy(const std::string& cause) {
+  if (cause == "lamp") return "a smaller or farther lamp, or a nearer wall";
+  if (cause == "diffraction") return "a nearer wall";
+  if (cause == "polish") return "less polish, or a larger lens";
+  return "closer rows, or a larger ball";
+}
+
+std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const GridWindow& grid,
+                                           std::span<const SurfaceField* const> surfaces,
+                                           const WaveOptions& options, const Executor& executor,
+                                           const RunControl& control) {
+  const double height = middle_height(grid, *surfaces.front());
   const SourceKernel kernel = source_kernel(setup, height);
   OpticalSetup in_parts = setup;
   in_parts.pixels *= kernel.parts;
-  WaveScene scene{in_parts, surface, options, control, LightPath(in_parts), {}};
+  WaveScene scene{options, control, wave_colors(in_parts, options.wavelength), {}};
   if (setup.outline) scene.edge.emplace(*setup.outline);
-  const double length = coherence_length(setup, height, options.wavelength);
-  const auto along = [&](int axis) {
-    return stretches(setup.lens_size[axis], options.tile * length, options.overlap * length);
+  const double length = coherence_length(setup, height, scene.colors.back().wavelength);
+  const CellRange all = all_cells(grid);
+  const auto along = [&](std::int64_t cells, int axis) {
+    const double unit = length / grid.spacing[axis];
+    return stretches(cells, options.tile * unit, options.overlap * unit);
   };
   std::vector<Tile> tiles;
-  for (const Stretch& y : along(1)) {
-    for (const Stretch& x : along(0)) tiles.push_back({x, y});
+  for (const Stretch& y : along(all.rows, 1)) {
+    for (const Stretch& x : along(all.columns, 0)) tiles.push_back({x, y});
   }
-  const std::vector<double> parts = light_of_point(scene, tiles, executor);
+  PointLightOf light(scene, grid, surfaces);
+  light.add(tiles, executor);
   SourceBlurOn<Executor> blur(kernel, setup.pixels.x(), setup.pixels.y(), executor);
-  const std::span<const double> flux = blur.apply(executor, parts);
-  return {flux.begin(), flux.end()};
-}
-
-namespace {
-
-/// Follows a spline row by row: each search begins where the last one ended.
-void sample_spline(const ControlNet& net, const WaveGrid& grid, WaveSamples& samples) {
-  const Eigen::Vector2d cells = net.cells().cast<double>();
-  const Eigen::Vector2d size(net.points.row(0).maxCoeff(), net.points.row(1).maxCoeff());
-  Eigen::Vector2d first = grid.origin.cwiseQuotient(size).cwiseProduct(cells);
-  for (int j = 0; j < grid.rows; ++j) {
-    first = net.parameters_of(grid.place(0, j), first);
-    Eigen::Vector2d uv = first;
-    for (int i = 0; i < grid.columns; ++i) {
-      uv = net.parameters_of(grid.place(i, j), uv);
-      const SurfaceShape shape = net.at(uv).shape();
-      samples.z.push_back(shape.z);
-      samples.slope_x.push_back(shape.slope.x());
-      samples.slope_y.push_back(shape.slope.y());
-    }
+  std::vector<std::vector<double>> pictures;
+  for (std::size_t s = 0; s < surfaces.size(); ++s) {
+    const std::vector<double> parts = light.of(s);
+    const std::span<const double> flux = blur.apply(executor, parts);
+    pictures.emplace_back(flux.begin(), flux.end());
   }
+  return pictures;
 }
 
-}  // namespace
-
-WaveSurface wave_surface(const OpticalSurface& surface) {
-  const auto* const spline = dynamic_cast<const SplineSurface*>(&surface);
-  return [&surface, spline](const WaveGrid& grid, WaveSamples& samples) {
-    samples = {};
-    if (spline != nullptr) return sample_spline(spline->net(), grid, samples);
-    for (int j = 0; j < grid.rows; ++j) {
-      for (int i = 0; i < grid.columns; ++i) {
-        const auto point = surface.at(nearest_inside(surface.box(), grid.place(i, j)));
-        samples.z.push_back(point ? point->z : 0.0);
-        samples.slope_x.push_back(point ? point->slope.x() : 0.0);
-        samples.slope_y.push_back(point ? point->slope.y() : 0.0);
-      }
-    }
-  };
-}
-
-double wave_detail(const OpticalSurface& surface) {
+GridWindow wave_grid(const OpticalSetup& setup, const OpticalSurface& surface) {
   const auto* const spline = dynamic_cast<const SplineSurface*>(&surface);
   const double pieces = spline != nullptr
                             ? static_cast<double>(spline->net().cell_count())
                             : 0.5 * static_cast<double>(surface.mesh().triangle_count());
-  return std::sqrt(surface.box().volume() / pieces);
+  return lens_grid(setup.lens_size, 0.25 * std::sqrt(surface.box().volume() / pieces));
 }
 
 }  // namespace lensforge

@@ -5,49 +5,22 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <functional>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/compute/executor.h"
 #include "core/lens/optical_surface.h"
+#include "core/lens/surface_field.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {
 
-/// A grid of nodes over a part of a surface: node (i, j) lies at origin + step ∘ (i, j), mm.
-struct WaveGrid {
-  Eigen::Vector2d origin{0.0, 0.0};
-  Eigen::Vector2d step{0.0, 0.0};
-  int columns = 0;
-  int rows = 0;
-
-  [[nodiscard]] Eigen::Vector2d place(int i, int j) const {
-    return origin + step.cwiseProduct(Eigen::Vector2d(i, j));
-  }
-};
-
-/// Heights (mm) and slopes at the nodes of a grid, row by row.
-struct WaveSamples {
-  std::vector<double> z, slope_x, slope_y;
-};
-
-/// Samples a surface over its lens's rectangle; called by several threads at once.
-using WaveSurface = std::function<void(const WaveGrid&, WaveSamples&)>;
-
-/// Samples a lens's surface. @param surface  must outlive the result; without creases.
-WaveSurface wave_surface(const OpticalSurface& surface);
-
-/// Length over which such a surface bends smoothly, mm: the mean knot cell of a spline, the mean
-/// side of other surfaces' triangles.
-double wave_detail(const OpticalSurface& surface);
-
 /// Light as a scalar wave.
 struct WaveOptions {
-  double wavelength = 550e-6;  ///< In air, mm, > 0.
-  /// Length over which the surface bends smoothly, mm, > 0: rays are traced a quarter of it apart.
-  double detail = 0.08;
-  /// Angle within which the surface scatters beside its rays, rad: λ / pitch for a tool's marks.
+  double wavelength = 550e-6;  ///< In air, mm, > 0; of a setup without a spectrum.
+  /// Angle within which the surfaces scatter beside their rays, rad: λ / pitch for a tool's marks.
   double scatter = 0.0;
   /// Side of the tiles into which the lens is divided, and width over which neighbours overlap, in
   /// lengths over which waves interfere: λ f / pixel, at least √(λ f). With 0 the lens is one
@@ -56,9 +29,14 @@ struct WaveOptions {
   double overlap = 8.0;
 };
 
-/// Light that a surface sends to every pixel of `setup`, as shares of the lens's whole, by scalar
-/// waves of one wavelength; row by row from the top. An extended source is many points whose light
-/// does not interfere: its picture is blurred, as by rays (source_kernel()).
+/// The grid on which waves follow a surface's rays: a quarter of the length over which it bends
+/// apart, which is the mean knot cell of a spline, the mean side of other surfaces' triangles.
+GridWindow wave_grid(const OpticalSetup& setup, const OpticalSurface& surface);
+
+/// Light that each of several surfaces of one lens sends to every pixel of `setup`, as shares of
+/// its whole, by scalar waves; row by row from the top. An extended source is many points whose
+/// light does not interfere: its picture is blurred, as by rays (source_kernel()). A spectrum's is
+/// the sum of its wavelengths'.
 ///
 /// The lens is divided into tiles with windows whose squares sum to 1. The rays of each are traced
 /// through its surface to a plane at its mean height, exactly; where they fold above the surface
@@ -69,11 +47,38 @@ struct WaveOptions {
 /// a pixel's mean, so windows that overlap more than that change nothing but the speed;
 /// WavePicture.* bound the error against one piece by 2e-4 MAE.
 ///
-/// Same bits for any number of threads.
+/// Tiles are sampled one after the other, each from all surfaces in order, so that surfaces made
+/// from one another can share samples (HeldField). Same bits for any number of threads.
+/// @param grid      nodes over the whole lens from which rays are traced; between them a surface is
+///                  the cubic of its heights and slopes.
+/// @param surfaces  without creases.
 /// @throw Interrupted.
-std::vector<double> wave_flux(const OpticalSetup& setup, const WaveSurface& surface,
-                              const WaveOptions& options, const Executor& executor,
-                              const RunControl& control);
+std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const GridWindow& grid,
+                                           std::span<const SurfaceField* const> surfaces,
+                                           const WaveOptions& options, const Executor& executor,
+                                           const RunControl& control);
+
+/// Wavelength to which most of a setup's brightness is near, mm: the middle one of its spectrum.
+/// @param otherwise  mm, for a setup without one.
+double middle_wavelength(const OpticalSetup& setup, double otherwise = WaveOptions{}.wavelength);
+
+/// Blurs of the light itself, that no surface escapes: the lamp's image (source_blur()), and
+/// √(λ f) for diffraction.
+/// @param z  height of the surface, mm. @param wavelength  mm
+std::vector<PictureBlur> light_blurs(const OpticalSetup& setup, double z, double wavelength);
+
+/// √(λ f), mm on the wall.
+double diffraction_width(const OpticalSetup& setup, double z, double wavelength);
+
+/// The widest. @pre not empty.
+const PictureBlur& widest(const std::vector<PictureBlur>& blurs);
+
+/// "diffraction blurs 1.0 pixels, polish 0.4, pitch 0.1"; causes below kNoBlur pixels are left out.
+std::string blur_words(const std::vector<PictureBlur>& blurs);
+inline constexpr double kNoBlur = 0.05;
+
+/// What makes a cause's blur smaller: "a nearer wall".
+const char* blur_remedy(const std::string& cause);
 
 // How a field goes from one plane to another, tile by tile.
 
@@ -116,6 +121,7 @@ struct PixelLight {
 };
 
 /// A scalar field without the phase of its mean ray, on as many nodes as its steepest rays ask for.
+/// Phases are found in double precision, values kept in single: 1e-7 of the field.
 class PlaneField {
  public:
   /// A ray on the plane.
@@ -128,11 +134,13 @@ class PlaneField {
 
   explicit PlaneField(const FieldPlan& plan);
 
-  /// Adds the field of a triangle of neighbouring rays at the nodes of which a point is inside it.
+  /// Adds the field of a triangle of neighbouring rays at the nodes of which a point is inside it,
+  /// at the latest when the field is propagated or lay_rest() is called.
   /// The path is the quadratic through the vertices with their directions as slopes; a triangle
   /// that is turned over is beyond a fold, where the phase is π/2 less. Points on a common side of
   /// two triangles belong to one of them.
   void add(const std::array<Vertex, 3>& vertices);
+  void lay_rest();
 
   /// Goes to the other plane by the angular spectrum: nodes are then around far_centre().
   void propagate();
@@ -144,18 +152,26 @@ class PlaneField {
 
   [[nodiscard]] const FieldPlan& plan() const { return plan_; }
   /// Node (i, j), (0, 0) the lowest.
-  [[nodiscard]] const std::complex<double>& at(int i, int j) const {
+  [[nodiscard]] const std::complex<float>& at(int i, int j) const {
     return values_[static_cast<std::size_t>(j) * static_cast<std::size_t>(plan_.columns) +
                    static_cast<std::size_t>(i)];
   }
-  [[nodiscard]] std::complex<double>& at(int i, int j) {
+  [[nodiscard]] std::complex<float>& at(int i, int j) {
     return values_[static_cast<std::size_t>(j) * static_cast<std::size_t>(plan_.columns) +
                    static_cast<std::size_t>(i)];
   }
 
  private:
+  /// Nodes to lay at once.
+  struct Pending {
+    std::vector<std::size_t> node;
+    std::vector<double> turns;  ///< Phase ÷ 2π.
+    std::vector<float> amplitude;
+  };
+
   FieldPlan plan_;
-  std::vector<std::complex<double>> values_;
+  std::vector<std::complex<float>> values_;
+  Pending pending_;
 };
 
 }  // namespace lensforge

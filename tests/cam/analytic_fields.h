@@ -7,7 +7,7 @@
 #include <functional>
 #include <utility>
 
-#include "cam/milled/surface_field.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge::testing {
 

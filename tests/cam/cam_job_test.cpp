@@ -51,8 +51,8 @@ TEST(CamJob, WritesProgramsPicturesAndReport) {
   std::vector<std::string> names;
   for (const auto& file : result.files) names.push_back(file.filename().string());
   EXPECT_THAT(names, ::testing::ElementsAre("rough.ngc", "semi.ngc", "finish.ngc", "milled.ply",
-                                            "milled.png", "leakage.png", "part.exr", "causes.exr",
-                                            "report.html", "report.json"));
+                                            "milled.png", "wall.png", "leakage.png", "part.exr",
+                                            "causes.exr", "report.html", "report.json"));
   EXPECT_EQ(folder.file_count(), names.size());
   const auto report = nlohmann::json::parse(read_bytes(folder / "report.json"));
   EXPECT_DOUBLE_EQ(report["z_offset"].get<double>(), result.report.z_offset);
@@ -78,6 +78,48 @@ TEST(CamJob, TheSplitAddsUpAndCausesThatAreNotThereCountNothing) {
     }
   }
   EXPECT_NEAR(sum, leakage.part().quality.leakage, 1e-12);
+}
+
+/// By waves the part is judged by what they show, and rays are reported beside them.
+TEST(CamJob, ByWavesTheVerdictIsTheirs) {
+  const TempFolder folder;
+  CamOptions options = coarse();
+  options.light = LightModel::kAuto;
+  options.surface = SurfaceModel::kSmooth;
+  options.remedies = false;
+  const ReportData data = run_cut(small_lens(), options, folder).report;
+  ASSERT_TRUE(data.waves);
+  const auto report = nlohmann::json::parse(read_bytes(folder / "report.json"));
+  EXPECT_EQ(report["light"]["model"], "waves");
+  const auto& waves = report["waves"]["leakage"];
+  EXPECT_EQ(waves["share"], data.waves->result.part().quality.leakage);
+  EXPECT_NE(waves["share"], report["leakage"]["share"]);
+  const auto& checks = data.verdict.checks;
+  const auto leaks = std::find_if(checks.begin(), checks.end(),
+                                  [](const LimitCheck& check) { return check.key == "leakage"; });
+  ASSERT_NE(leaks, checks.end());
+  EXPECT_NEAR(leaks->value, 100.0 * waves["share"].get<double>(), 1e-9);
+  EXPECT_NE(read_bytes(folder / "wall.png"), read_bytes(folder / "milled.png"));
+  EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr("polished, by waves"));
+
+  options.light = LightModel::kRays;
+  const TempFolder rays;
+  run_cut(small_lens(), options, rays);
+  EXPECT_EQ(read_bytes(rays / "wall.png"), read_bytes(rays / "milled.png"));
+  EXPECT_EQ(read_bytes(rays / "milled.png"), read_bytes(folder / "milled.png"));
+}
+
+TEST(CamJob, WavesAskForASurfaceWithoutCreases) {
+  const TempFolder folder;
+  CamOptions options = coarse();
+  options.light = LightModel::kWaves;
+  options.surface = SurfaceModel::kFacet;
+  EXPECT_THAT([&] { run_cut(small_lens(), options, folder); },
+              ::testing::ThrowsMessage<InputError>(HasSubstr("--light-model waves: the part has")));
+  options.surface = SurfaceModel::kSmooth;
+  options.workshop.polish.sigma = 0.0;
+  EXPECT_THAT([&] { run_cut(small_lens(), options, folder); },
+              ::testing::ThrowsMessage<InputError>(HasSubstr("unpolished")));
 }
 
 /// A machine that goes too far makes another part of the same programs.

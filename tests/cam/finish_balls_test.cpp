@@ -13,13 +13,13 @@
 #include "cam/milled/designed_field.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
-#include "cam/milled/surface_field.h"
 #include "cam/milled_paths.h"
 #include "cam/path/finish_raster.h"
 #include "cam/plan/finishing.h"
 #include "cam/predict/part_surfaces.h"
 #include "core/error.h"
 #include "core/lens/surface_check.h"
+#include "core/lens/surface_field.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

@@ -8,7 +8,7 @@
 
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled/ball_sweep.h"
-#include "cam/milled/surface_field.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge::testing {
 

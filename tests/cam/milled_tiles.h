@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "cam/milled/surface_field.h"
 #include "cam/milled_paths.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge::testing {
 

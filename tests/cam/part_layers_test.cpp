@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "cam/analytic_fields.h"
-#include "cam/milled/surface_field.h"
 #include "cam/predict/part_surfaces.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 namespace {

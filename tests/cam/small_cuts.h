@@ -7,10 +7,11 @@
 /// Cuts that are quick enough for a test.
 namespace lensforge::testing {
 
-/// With everything that a cut has, predicted coarsely.
+/// With everything that a cut has, predicted coarsely, by rays: waves take longer.
 inline CamOptions coarse() {
   CamOptions options;
   options.sample_spacing = 0.03;
+  options.light = LightModel::kRays;
   return options;
 }
 

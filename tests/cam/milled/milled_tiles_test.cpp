@@ -11,8 +11,8 @@
 #include "cam/milled/designed_field.h"
 #include "cam/milled/mould.h"
 #include "cam/milled/rounded_field.h"
-#include "cam/milled/surface_field.h"
 #include "cam/milled_paths.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 namespace {

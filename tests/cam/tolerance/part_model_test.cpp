@@ -15,11 +15,11 @@
 #include "cam/leakage/leakage.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
-#include "cam/milled/surface_field.h"
 #include "cam/path/finish_raster.h"
 #include "cam/plan/finishing.h"
 #include "cam/predict/part_surfaces.h"
 #include "core/error.h"
+#include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
 
 namespace lensforge {

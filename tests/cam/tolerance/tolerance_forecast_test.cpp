@@ -9,10 +9,10 @@
 #include <optional>
 #include <stop_token>
 
-#include "cam/milled/surface_field.h"
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/part_model.h"
 #include "core/error.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 namespace {

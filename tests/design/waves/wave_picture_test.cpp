@@ -6,12 +6,13 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <numeric>
 #include <vector>
 
 #include "core/image/transfer.h"
-#include "core/lens/optical_surface.h"
+#include "core/lens/surface_field.h"
 #include "design/render.h"
 
 namespace lensforge {
@@ -22,20 +23,26 @@ constexpr double kHeight = 3.0;  ///< Of flat surfaces, mm.
 
 /// A surface from its formula, f(x, y) = z and slopes.
 template <class Formula>
-WaveSurface surface_of(const Formula& f) {
-  return [f](const WaveGrid& grid, WaveSamples& samples) {
-    samples = {};
-    for (int j = 0; j < grid.rows; ++j) {
-      for (int i = 0; i < grid.columns; ++i) {
-        const Eigen::Vector2d at = grid.place(i, j);
-        const Eigen::Vector3d point = f(at.x(), at.y());
-        samples.z.push_back(point[0]);
-        samples.slope_x.push_back(point[1]);
-        samples.slope_y.push_back(point[2]);
-      }
+class FormulaField final : public SurfaceField {
+ public:
+  explicit FormulaField(const Formula& formula) : formula_(formula) {}
+
+  void sample(const GridWindow& window, const Executor& /*executor*/,
+              SurfacePatch& patch) const override {
+    resize_patch(window, false, patch);
+    for (std::int64_t n = 0; n < window.size(); ++n) {
+      const Eigen::Vector2d at = window.node(n % window.columns, n / window.columns);
+      const Eigen::Vector3d point = formula_(at.x(), at.y());
+      const auto k = static_cast<std::size_t>(n);
+      patch.z[k] = point[0];
+      patch.slope_x[k] = point[1];
+      patch.slope_y[k] = point[2];
     }
-  };
-}
+  }
+
+ private:
+  Formula formula_;
+};
 
 /// A square lens before a wall of as many pixels, 75 mm from the surface.
 OpticalSetup setup_of(double side, int pixels, double distance = 75.0) {
@@ -53,9 +60,13 @@ WaveOptions in_one_piece() {
   return options;
 }
 
-std::vector<double> waves(const OpticalSetup& setup, const WaveSurface& surface,
-                          const WaveOptions& options, int threads = 2) {
-  return wave_flux(setup, surface, options, Executor::cpu(threads), {});
+/// @param bend  length over which the surface bends smoothly, mm.
+std::vector<double> waves(const OpticalSetup& setup, const SurfaceField& surface,
+                          const WaveOptions& options, double bend = 0.08, int threads = 2) {
+  const SurfaceField* const one = &surface;
+  return wave_flux(setup, lens_grid(setup.lens_size, 0.25 * bend), {&one, 1}, options,
+                   Executor::cpu(threads), {})
+      .front();
 }
 
 double sum_of(const std::vector<double>& flux) {
@@ -92,13 +103,13 @@ std::vector<double> slit(double side, int pixels, double distance, double wavele
 
 TEST(WavePicture, AFlatLensIsASquareAperture) {
   const OpticalSetup setup = setup_of(2.0, 16);
-  const auto flat = surface_of([](double, double) { return Eigen::Vector3d(kHeight, 0.0, 0.0); });
+  const auto flat = FormulaField([](double, double) { return Eigen::Vector3d(kHeight, 0.0, 0.0); });
   const std::vector<double> one = slit(2.0, 16, 75.0, 550e-6);
   // As finely as it takes, and by default.
   WaveOptions fine = in_one_piece();
   fine.scatter = 0.04;
-  for (const WaveOptions& options : {fine, WaveOptions{550e-6, 0.04, 0.0, 3.0, 1.5}}) {
-    const std::vector<double> flux = waves(setup, flat, options);
+  for (const WaveOptions& options : {fine, WaveOptions{550e-6, 0.0, 3.0, 1.5}}) {
+    const std::vector<double> flux = waves(setup, flat, options, 0.04);
     for (int row = 0; row < 16; ++row) {
       for (int column = 0; column < 16; ++column) {
         const double expected =
@@ -122,7 +133,7 @@ TEST(WavePicture, ACylindersFocusIsASinc) {
   setup.image_origin.y() = -0.5 * kSide;
   setup.pixels = {80, 4};
   // n z + √(x² + (D − z)²) is the same for all x, z from the apex on.
-  const auto lens = surface_of([&](double x, double) {
+  const auto lens = FormulaField([&](double x, double) {
     const double u = x - 0.5 * kSide;
     const double a = kIndex * kIndex - 1.0;
     const double b = kDistance * (kIndex - 1.0);
@@ -132,9 +143,8 @@ TEST(WavePicture, ACylindersFocusIsASinc) {
     return Eigen::Vector3d(kHeight + z, -u / root, 0.0);
   });
   WaveOptions options = in_one_piece();
-  options.detail = 0.02;
   options.scatter = 0.06;
-  const std::vector<double> flux = waves(setup, lens, options);
+  const std::vector<double> flux = waves(setup, lens, options, 0.02);
   const double pixel = kSide / 80.0;
   for (int column = 30; column < 50; ++column) {
     double expected = 0.0;
@@ -162,15 +172,14 @@ TEST(WavePicture, OrdersOfASinusoidalRippleAreBessels) {
     setup.image_size = {9.0, kSide};
     setup.image_origin = {-3.9, 0.0};
     setup.pixels = {180, 1};
-    const auto ripple = surface_of([&](double x, double) {
+    const auto ripple = FormulaField([&](double x, double) {
       const double phase = kTwoPi * x / kPeriod;
       return Eigen::Vector3d(kHeight + amplitude * std::sin(phase),
                              kTwoPi * amplitude / kPeriod * std::cos(phase), 0.0);
     });
     WaveOptions options = in_one_piece();
-    options.detail = 0.01;
     options.scatter = 5.0 * options.wavelength / kPeriod;
-    const std::vector<double> flux = waves(setup, ripple, options);
+    const std::vector<double> flux = waves(setup, ripple, options, 0.01);
     const double depth = kTwoPi * (setup.ior - 1.0) * amplitude / options.wavelength;
     const double apart = 75.0 * options.wavelength / kPeriod;  // 0.69 mm
     for (int order = -3; order <= 3; ++order) {
@@ -193,15 +202,17 @@ TEST(WavePicture, OrdersOfASinusoidalRippleAreBessels) {
 }
 
 /// Gentle bumps, as of a lens; their rays do not cross before the wall.
+Eigen::Vector3d bump(double x, double y) {
+  constexpr double kHigh = 4e-4;
+  const double kx = kTwoPi / 1.3;
+  const double ky = kTwoPi / 1.7;
+  return {kHeight + kHigh * std::sin(kx * x) * std::cos(ky * y),
+          kHigh * kx * std::cos(kx * x) * std::cos(ky * y),
+          -kHigh * ky * std::sin(kx * x) * std::sin(ky * y)};
+}
+
 auto bumps() {
-  return surface_of([](double x, double y) {
-    constexpr double kHigh = 4e-4;
-    const double kx = kTwoPi / 1.3;
-    const double ky = kTwoPi / 1.7;
-    return Eigen::Vector3d(kHeight + kHigh * std::sin(kx * x) * std::cos(ky * y),
-                           kHigh * kx * std::cos(kx * x) * std::cos(ky * y),
-                           -kHigh * ky * std::sin(kx * x) * std::sin(ky * y));
-  });
+  return FormulaField([](double x, double y) { return bump(x, y); });
 }
 
 TEST(WavePicture, TilesHaveThePictureOfOnePiece) {
@@ -218,10 +229,9 @@ TEST(WavePicture, NearsThatOfRaysAsTheWavelengthFalls) {
   SampledSurface samples = make_samples({321, 321});
   for (int j = 0; j < 321; ++j) {
     for (int i = 0; i < 321; ++i) {
-      WaveSamples one;
-      bumps()({{0.02 * i, 0.02 * j}, {1.0, 1.0}, 1, 1}, one);
-      samples.mesh.vertices.col(j * 321 + i) << 0.02 * i, 0.02 * j, one.z[0];
-      samples.normals.col(j * 321 + i) << -one.slope_x[0], -one.slope_y[0], 1.0;
+      const Eigen::Vector3d one = bump(0.02 * i, 0.02 * j);
+      samples.mesh.vertices.col(j * 321 + i) << 0.02 * i, 0.02 * j, one[0];
+      samples.normals.col(j * 321 + i) << -one[1], -one[2], 1.0;
     }
   }
   const std::vector<double> rays =
@@ -239,7 +249,7 @@ TEST(WavePicture, SameBitsForAnyNumberOfThreads) {
   const OpticalSetup setup = setup_of(6.4, 32);
   WaveOptions tiles;
   tiles.tile = 8.0;
-  EXPECT_EQ(waves(setup, bumps(), tiles, 1), waves(setup, bumps(), tiles, 3));
+  EXPECT_EQ(waves(setup, bumps(), tiles, 0.08, 1), waves(setup, bumps(), tiles, 0.08, 3));
 }
 
 }  // namespace

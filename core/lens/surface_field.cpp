@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/milled/surface_field.h"
+#include "core/lens/surface_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +9,8 @@
 
 #include "core/error.h"
 #include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {
@@ -126,6 +128,59 @@ void HeldField::sample(const GridWindow& window, const Executor& executor,
   copy_part(all, held_.cut, window, executor, patch.cut);
   copy_part(all, held_.depth, window, executor, patch.depth);
   copy_part(all, held_.width, window, executor, patch.width);
+}
+
+namespace {
+
+/// Finds the parameters of one node after another: each search begins where the last one ended.
+class SplineRow {
+ public:
+  explicit SplineRow(const ControlNet& net) : net_(net) {}
+
+  [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) {
+    if (!begun_) {
+      const Eigen::Vector2d size(net_.points.row(0).maxCoeff(), net_.points.row(1).maxCoeff());
+      uv_ = xy.cwiseQuotient(size).cwiseProduct(net_.cells().cast<double>());
+      begun_ = true;
+    }
+    uv_ = net_.parameters_of(xy, uv_);
+    const SurfaceShape shape = net_.at(uv_).shape();
+    return {shape.z, shape.slope};
+  }
+
+ private:
+  const ControlNet& net_;
+  Eigen::Vector2d uv_ = Eigen::Vector2d::Zero();
+  bool begun_ = false;
+};
+
+}  // namespace
+
+void OpticalField::sample(const GridWindow& window, const Executor& executor,
+                          SurfacePatch& patch) const {
+  resize_patch(window, false, patch);
+  const auto* const spline = dynamic_cast<const SplineSurface*>(&surface_);
+  const auto fill_row = [&](std::int64_t j, const auto& point_at) {
+    for (std::int64_t i = 0; i < window.columns; ++i) {
+      const auto n = static_cast<std::size_t>(j * window.columns + i);
+      const SurfacePoint point = point_at(nearest_inside(surface_.box(), window.node(i, j)));
+      patch.z[n] = point.z;
+      patch.slope_x[n] = point.slope.x();
+      patch.slope_y[n] = point.slope.y();
+    }
+  };
+  const auto sample_row = [&](std::int64_t j) {
+    if (spline != nullptr) {
+      SplineRow row(spline->net());
+      return fill_row(j, [&](const Eigen::Vector2d& xy) { return row.at(xy); });
+    }
+    fill_row(j, [&](const Eigen::Vector2d& xy) {
+      if (const auto point = surface_.at(xy)) return *point;
+      throw InputError("surface: nothing at x " + decimal_text(xy.x(), 3) + " y " +
+                       decimal_text(xy.y(), 3) + " mm; it must cover the whole lens");
+    });
+  };
+  parallel_for(executor, "surface", window.rows, sample_row, 4);
 }
 
 SurfaceMesh mesh_of(const SurfacePatch& patch) {

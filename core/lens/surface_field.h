@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/lens/optical_surface.h"
 #include "core/mesh/surface_mesh.h"
 
 namespace lensforge {
@@ -119,6 +120,21 @@ class HeldField final : public SurfaceField {
  private:
   const SurfaceField& field_;
   mutable SurfacePatch held_;
+};
+
+/// A surface without creases, node by node.
+class OpticalField final : public SurfaceField {
+ public:
+  /// @param surface  must outlive the field. @pre not surface.has_creases()
+  explicit OpticalField(const OpticalSurface& surface) : surface_(surface) {}
+
+  /// Nodes beside the surface take the height and slopes of the nearest point of its rectangle.
+  /// @throw InputError naming a node above or below which a jagged rim leaves nothing.
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+ private:
+  const OpticalSurface& surface_;
 };
 
 /// The sampled surface as a grid mesh: two triangles between four nodes.

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fftw3.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <mutex>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "core/optics/light_path.h"
+#include "design/waves/wave_picture.h"
+
+namespace lensforge {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+/// FFTW plans one transform at a time.
+std::mutex& planning() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+void transform(std::vector<std::complex<float>>& values, int columns, int rows, int sign) {
+  // std::complex has the layout of two numbers ([complex.numbers.general]).
+  auto* const data = reinterpret_cast<fftwf_complex*>(values.data());  // NOLINT(*-reinterpret-cast)
+  fftwf_plan plan = nullptr;
+  {
+    const std::lock_guard lock(planning());
+    plan = fftwf_plan_dft_2d(rows, columns, data, data, sign, FFTW_ESTIMATE);
+  }
+  fftwf_execute(plan);
+  const std::lock_guard lock(planning());
+  fftwf_destroy_plan(plan);
+}
+
+/// e^{2πi t} of many t at once; most of the work of laying and propagating fields.
+class UnitPhases {
+ public:
+  void find(const std::vector<double>& turns) {
+    const Eigen::Map<const Eigen::ArrayXd> t(turns.data(), static_cast<Eigen::Index>(turns.size()));
+    // Adding it rounds to whole numbers.
+    constexpr double kRounds = 6755399441055744.0;
+    const Eigen::ArrayXf angle = (kTwoPi * (t - ((t + kRounds) - kRounds))).cast<float>();
+    cosine_ = angle.cos();
+    sine_ = angle.sin();
+  }
+  [[nodiscard]] std::complex<float> operator[](std::size_t k) const {
+    const auto at = static_cast<Eigen::Index>(k);
+    return {cosine_[at], sine_[at]};
+  }
+
+ private:
+  Eigen::ArrayXf cosine_, sine_;
+};
+
+/// Nodes laid at once.
+constexpr std::size_t kPending = 2048;
+
+/// Square of the least cosine of a direction that goes on: a degree from the plane.
+constexpr double kGrazing = 3e-4;
+
+/// Vertices are moved to this part of a step, so that sides are found without rounding.
+constexpr double kParts = 1024.0;
+
+/// A linear function of a place.
+struct Plane {
+  double a = 0.0, b = 0.0, c = 0.0;
+
+  [[nodiscard]] double at(double x, double y) const { return a * x + b * y + c; }
+};
+
+/// A triangle of rays on the nodes of a field. Places are in steps from the first node, vertices'
+/// and those tested for being inside whole parts of one: sides are then exact.
+class LaidTriangle {
+ public:
+  LaidTriangle(const FieldPlan& plan, const std::array<PlaneField::Vertex, 3>& vertices) {
+    std::array<Eigen::Vector2d, 3> at;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector2d steps =
+          (vertices[k].place - plan.centre).cwiseQuotient(plan.step) + plan.middle();
+      at[k] = (kParts * steps).array().round().matrix() / kParts;
+      box_.extend(at[k]);
+    }
+    doubled_ = cross(at[1] - at[0], at[2] - at[0]);
+    if (doubled_ == 0.0) return;
+    const double turn = doubled_ < 0.0 ? -1.0 : 1.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector2d& from = at[(k + 1) % 3];
+      const Eigen::Vector2d& to = at[(k + 2) % 3];
+      Plane& side = sides_[k];
+      side = {turn * (from.y() - to.y()), turn * (to.x() - from.x()), 0.0};
+      side.c = -(side.a * from.x() + side.b * from.y());
+      own_[k] = side.a > 0.0 || (side.a == 0.0 && side.b > 0.0);
+      lay(plan, vertices[k], at[k], k);
+    }
+  }
+
+  [[nodiscard]] bool is_empty() const { return doubled_ == 0.0; }
+  [[nodiscard]] const Eigen::AlignedBox2d& box() const { return box_; }
+  /// Points on a side belong to it if it is a lower or a left one.
+  [[nodiscard]] bool contains(double x, double y) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double side = sides_[k].at(x, y);
+      if (!(side > 0.0 || (side == 0.0 && own_[k]))) return false;
+    }
+    return true;
+  }
+
+  /// Number of the points of a node's cell inside.
+  [[nodiscard]] int points_inside(const Eigen::Vector2i& points, int column, int row) const {
+    const int all = points.prod();
+    if (all == 1) return contains(column, row) ? 1 : 0;
+    bool crosses = false;
+    for (const Plane& side : sides_) {
+      const double middle = side.at(column, row);
+      const double half = 0.5 * (std::abs(side.a) + std::abs(side.b));
+      if (middle < -half) return 0;
+      crosses = crosses || middle <= half;
+    }
+    if (!crosses) return all;
+    int inside = 0;
+    for (int j = 0; j < points.y(); ++j) {
+      const double y = row + (j + 0.5) / points.y() - 0.5;
+      for (int i = 0; i < points.x(); ++i) {
+        if (contains(column + (i + 0.5) / points.x() - 0.5, y)) ++inside;
+      }
+    }
+    return inside;
+  }
+
+  /// Amplitude and phase ÷ 2π of the field at a node, inside or near it. Linear interpolation of
+  /// the path errs by as much to one side as the mean of the vertices' tangent planes does to the
+  /// other.
+  [[nodiscard]] std::pair<double, double> field(double x, double y) const {
+    double turns = 0.0;
+    double amplitude = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double share = sides_[k].at(x, y);
+      turns += share * turns_[k].at(x, y);
+      amplitude += share * amplitude_[k];
+    }
+    const double scale = 1.0 / std::abs(doubled_);
+    return {scale * std::max(amplitude, 0.0), scale * turns - (doubled_ < 0.0 ? 0.25 : 0.0)};
+  }
+
+ private:
+  /// Turns without those of the mean ray: the mean of the vertex's own and its tangent plane's.
+  void lay(const FieldPlan& plan, const PlaneField::Vertex& vertex, const Eigen::Vector2d& at,
+           std::size_t k) {
+    amplitude_[k] = vertex.amplitude;
+    const Eigen::Vector2d half = 0.5 / plan.wavelength * vertex.cosine.cwiseProduct(plan.step);
+    const Eigen::Vector2d mean = plan.cosine.cwiseProduct(plan.step) / plan.wavelength;
+    const Eigen::Vector2d by_step = half - mean;
+    turns_[k] = {by_step.x(), by_step.y(),
+                 vertex.path / plan.wavelength - half.dot(at) + mean.dot(plan.middle())};
+  }
+
+  Eigen::AlignedBox2d box_;
+  std::array<Plane, 3> sides_;  ///< Opposite to the vertices; > 0 inside.
+  std::array<bool, 3> own_{};   ///< True if points on the side belong to the triangle.
+  std::array<Plane, 3> turns_;
+  std::array<double, 3> amplitude_{};
+  double doubled_ = 0.0;  ///< Twice the area; < 0 if it is turned over.
+};
+
+}  // namespace
+
+int transform_size(double least) {
+  for (int size = 2 * static_cast<int>(std::ceil(0.5 * std::max(least, 8.0)));; size += 2) {
+    int rest = size;
+    for (const int factor : {2, 3, 5, 7}) {
+      while (rest % factor == 0) rest /= factor;
+    }
+    if (rest == 1) return size;
+  }
+}
+
+PlaneField::PlaneField(const FieldPlan& plan)
+    : plan_(plan),
+      values_(static_cast<std::size_t>(plan.columns) * static_cast<std::size_t>(plan.rows)) {}
+
+void PlaneField::add(const std::array<Vertex, 3>& vertices) {
+  const LaidTriangle triangle(plan_, vertices);
+  if (triangle.is_empty()) return;
+  // The nodes whose cells the triangle meets.
+  const Eigen::Vector2d last(plan_.columns - 1, plan_.rows - 1);
+  const Eigen::Vector2d low = (triangle.box().min().array() + 0.5).floor().max(0.0);
+  const Eigen::Vector2d high =
+      (triangle.box().max().array() + 0.5).floor().min(last.array()).max(-1.0);
+  const double weight = 1.0 / plan_.points.prod();
+  const auto from = low.cwiseMin(last + Eigen::Vector2d::Ones()).cast<int>().eval();
+  const auto to = high.cast<int>().eval();
+  for (int j = from.y(); j <= to.y(); ++j) {
+    for (int i = from.x(); i <= to.x(); ++i) {
+      const int inside = triangle.points_inside(plan_.points, i, j);
+      if (inside == 0) continue;
+      const auto [amplitude, turns] = triangle.field(i, j);
+      pending_.node.push_back(static_cast<std::size_t>(j) *
+                                  static_cast<std::size_t>(plan_.columns) +
+                              static_cast<std::size_t>(i));
+      pending_.turns.push_back(turns);
+      pending_.amplitude.push_back(static_cast<float>(weight * inside * amplitude));
+    }
+  }
+  if (pending_.node.size() >= kPending) lay_rest();
+}
+
+void PlaneField::lay_rest() {
+  UnitPhases phases;
+  phases.find(pending_.turns);
+  for (std::size_t k = 0; k < pending_.node.size(); ++k) {
+    values_[pending_.node[k]] += pending_.amplitude[k] * phases[k];
+  }
+  pending_.node.clear();
+  pending_.turns.clear();
+  pending_.amplitude.clear();
+}
+
+/// A component of the spectrum with the direction p turns by k D √(1 − |p|²), without what the mean
+/// ray's turns by and without the shift of the nodes to far_centre().
+void PlaneField::propagate() {
+  lay_rest();
+  transform(values_, plan_.columns, plan_.rows, FFTW_FORWARD);
+  const Eigen::Vector2d slope = plan_.slope();
+  const double root = std::sqrt(1.0 - plan_.cosine.squaredNorm());
+  const auto direction = [&](int n, int count, int axis) {
+    const int frequency = n < (count + 1) / 2 ? n : n - count;
+    return plan_.wavelength * frequency / (count * plan_.step[axis]);
+  };
+  const auto columns = static_cast<std::size_t>(plan_.columns);
+  const double wavelengths = plan_.distance / plan_.wavelength;
+  const double scale = 1.0 / static_cast<double>(values_.size());
+  std::vector<double> more_x(columns);
+  for (int i = 0; i < plan_.columns; ++i) {
+    more_x[static_cast<std::size_t>(i)] = direction(i, plan_.columns, 0);
+  }
+  std::vector<double> turns(columns);
+  std::vector<float> kept(columns);
+  UnitPhases phases;
+  for (int j = 0; j < plan_.rows; ++j) {
+    const double more_y = direction(j, plan_.rows, 1);
+    const double y = plan_.cosine.y() + more_y;
+    for (std::size_t i = 0; i < columns; ++i) {
+      const double x = plan_.cosine.x() + more_x[i];
+      const double square = 1.0 - x * x - y * y;
+      const double going = std::sqrt(std::max(square, kGrazing));
+      const double aside_x = std::abs(plan_.distance * (x / going - slope.x()));
+      const double aside_y = std::abs(plan_.distance * (y / going - slope.y()));
+      const bool keep =
+          square > kGrazing && aside_x <= plan_.reach.x() && aside_y <= plan_.reach.y();
+      // √s − √s0 without cancellation.
+      const double longer = (square - root * root) / (going + root);
+      turns[i] = wavelengths * (longer + slope.x() * more_x[i] + slope.y() * more_y);
+      kept[i] = keep ? static_cast<float>(scale) : 0.0F;
+    }
+    phases.find(turns);
+    std::complex<float>* const row = &at(0, j);
+    for (std::size_t i = 0; i < columns; ++i) row[i] *= kept[i] * phases[i];
+  }
+  transform(values_, plan_.columns, plan_.rows, FFTW_BACKWARD);
+}
+
+PixelLight PlaneField::spread(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
+                              const Eigen::Vector2i& pixels) const {
+  const Eigen::Matrix2d by_node = by_mm * plan_.step.asDiagonal();
+  const Eigen::Vector2d cell = by_node.cwiseAbs().rowwise().sum();
+  const Eigen::Vector2d half =
+      0.5 * by_node.cwiseAbs() * Eigen::Vector2d(plan_.columns, plan_.rows) + cell;
+  PixelLight result;
+  const Eigen::Vector2i low = (centre - half).array().floor().cast<int>().max(0);
+  const Eigen::Vector2i high = (centre + half).array().ceil().cast<int>().min(pixels.array());
+  if (low.x() >= high.x() || low.y() >= high.y()) return result;
+  result.first = low;
+  result.columns = high.x() - low.x();
+  result.rows = high.y() - low.y();
+  result.light.assign(
+      static_cast<std::size_t>(result.columns) * static_cast<std::size_t>(result.rows), 0.0);
+  const double area = plan_.step.prod();
+  /// Pixels that a cell touches along one axis, and its share in each.
+  const auto touched = [&](int axis, double at, const auto& take) {
+    const double from = at - 0.5 * cell[axis];
+    const double to = at + 0.5 * cell[axis];
+    for (int pixel = std::max(low[axis], static_cast<int>(std::floor(from)));
+         pixel < high[axis] && pixel < to; ++pixel) {
+      const double share = (std::min(to, pixel + 1.0) - std::max(from, double(pixel))) / cell[axis];
+      if (share > 0.0) take(pixel - low[axis], share);
+    }
+  };
+  for (int j = 0; j < plan_.rows; ++j) {
+    for (int i = 0; i < plan_.columns; ++i) {
+      const double light = static_cast<double>(std::norm(at(i, j))) * area;
+      if (light == 0.0) continue;
+      const Eigen::Vector2d place = centre + by_node * (Eigen::Vector2d(i, j) - plan_.middle());
+      // Most cells touch one pixel.
+      const Eigen::Vector2d from = place - 0.5 * cell - low.cast<double>();
+      if (from.minCoeff() >= 0.0) {
+        const auto column = static_cast<int>(from.x());
+        const auto row = static_cast<int>(from.y());
+        if (from.x() + cell.x() < column + 1 && from.y() + cell.y() < row + 1 &&
+            column < result.columns && row < result.rows) {
+          result.light[static_cast<std::size_t>(row) * static_cast<std::size_t>(result.columns) +
+                       static_cast<std::size_t>(column)] += light;
+          continue;
+        }
+      }
+      touched(1, place.y(), [&](int row, double of_row) {
+        touched(0, place.x(), [&](int column, double of_column) {
+          result.light[static_cast<std::size_t>(row) * static_cast<std::size_t>(result.columns) +
+                       static_cast<std::size_t>(column)] += light * of_row * of_column;
+        });
+      });
+    }
+  }
+  return result;
+}
+
+}  // namespace lensforge
