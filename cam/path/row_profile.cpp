@@ -50,6 +50,10 @@ constexpr double kFarthestRest = 0.98;
 /// Length of the stretches whose facets are made at once, mm.
 constexpr double kFacetStretch = 1.0;
 
+/// Contacts this close to the rim count as on it, in radii: moves that take the ball over the rim
+/// need room, and shorter ones than the controller takes in time are merged there.
+constexpr double kOnRim = 0.1;
+
 /// Places this close before the end of a stretch, in stretches, belong to the next: rounding.
 constexpr double kSameStretch = 1e-6;
 
@@ -154,15 +158,18 @@ void extend_shaped(double place, RowProfile& profile) {
   profile.shaped_to = std::max(profile.shaped_to, place);
 }
 
-/// Extends the shaped range by the places where the ball touches the surface within its rim across
-/// the row.
-void extend_shaped(const CurveNodes& nodes, const Eigen::AlignedBox2d& box, int along,
+/// The part of a bed within its rim.
+Eigen::AlignedBox2d off_rim(const SmoothBed& bed) {
+  const Eigen::Vector2d rim = Eigen::Vector2d::Constant(kOnRim * bed.radius());
+  const Eigen::AlignedBox2d& box = bed.surface().box();
+  return {box.min() + rim, box.max() - rim};
+}
+
+/// Extends the shaped range by the places where the ball touches the surface within its rim.
+void extend_shaped(const CurveNodes& nodes, const Eigen::AlignedBox2d& inside,
                    RowProfile& profile) {
   for (std::size_t i = 0; i < nodes.u.size(); ++i) {
-    const double contact = nodes.contact[i][along];
-    if (contact > box.min()[along] && contact < box.max()[along]) {
-      extend_shaped(nodes.u[i], profile);
-    }
+    if (inside.contains(nodes.contact[i])) extend_shaped(nodes.u[i], profile);
   }
 }
 
@@ -291,7 +298,7 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
   const double apart = lift != nullptr ? kLiftNodes : HUGE_VAL;
   const double length = kStretch * surface_->radius();
   const double least = kMinStretch * surface_->radius();
-  const Eigen::AlignedBox2d& box = surface_->bed()->surface().box();
+  const Eigen::AlignedBox2d inside = off_rim(*surface_->bed());
   std::swap(profile.shaped_from, profile.shaped_to);  // Nothing yet.
   double open = span.held_from;                       // The curve is unknown from here to `begin`.
   double begin = span.held_from;
@@ -308,7 +315,7 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
         nodes->z[i] += lift->at(span.line.at(nodes->u[i]), nodes->contact[i]);
       }
       if (open < begin) pass_over(span, open, &*nodes, begin, bow, profile);
-      extend_shaped(*nodes, box, span.line.along, profile);
+      extend_shaped(*nodes, inside, profile);
       add_nodes(*nodes, bow, lift != nullptr, profile);
       open = end;
     }
@@ -319,10 +326,13 @@ void RowCurves::roll(const RowSpan& span, double bow, RowProfile& profile) const
 
 void RowCurves::pass_over(const RowSpan& span, double from, const CurveNodes* next, double to,
                           double bow, RowProfile& profile) const {
-  const Eigen::AlignedBox2d& box = surface_->bed()->surface().box();
+  const Eigen::AlignedBox2d inside = off_rim(*surface_->bed());
   const int along = span.line.along;
-  for (const double end : {from, to}) {
-    extend_shaped(std::clamp(end, box.min()[along], box.max()[along]), profile);
+  const int other = 1 - along;
+  if (span.line.across > inside.min()[other] && span.line.across < inside.max()[other]) {
+    for (const double end : {from, to}) {
+      extend_shaped(std::clamp(end, inside.min()[along], inside.max()[along]), profile);
+    }
   }
   const BallLift* const lift = surface_->lift();
   if (lift != nullptr && lift->clears()) return clear(span, from, next, to, profile);

@@ -42,7 +42,8 @@ struct RowProfile {
   std::vector<double> joints;
   double error = 0.0;             ///< mm
   double finest = kProfileError;  ///< Intended maximum error of chords, mm.
-  /// Beyond these places the ball touches only the surface's rim, mm: its direction shapes nothing.
+  /// Beyond these places the ball touches only the surface's rim, mm: its direction shapes nothing
+  /// that matters.
   double shaped_from = -HUGE_VAL, shaped_to = HUGE_VAL;
 
   [[nodiscard]] bool shapes(double place) const {

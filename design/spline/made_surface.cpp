@@ -20,6 +20,12 @@ constexpr int kReach = GaussianWeights::kReach;
 constexpr double kSpacing = 0.75;  ///< Distance between samples, in σ.
 constexpr double kMaxSamples = 1e8;
 
+/// Samples next to each rim, and their distance, in that of the others: three of them lie in the
+/// outermost knot cell if it is at least 0.28 σ wide, where differences are exact. With half of it
+/// rounding takes a tenfold error to gradients.
+constexpr int kBesideRim = 3;
+constexpr double kRimSpacing = 1.0 / 8.0;
+
 }  // namespace
 
 GaussianWeights::GaussianWeights(double offset, double step, double sigma) {
@@ -63,21 +69,40 @@ AveragingGrid::AveragingGrid(const Eigen::Vector2d& lens_size, const MadeBy& mad
   const Eigen::Array2d wanted = size_.array() / (kSpacing * sigma_.array());
   cells_ = wanted.ceil().cast<int>().max(kReach);
   step_ = size_.array() / cells_.cast<double>().array();
+  lines_ = {make_lines(0), make_lines(1)};
+}
+
+/// In make_heights() the samples next to the rim, from it inwards, are behind all others.
+std::vector<AveragingGrid::Line> AveragingGrid::make_lines(int axis) const {
+  const double step = step_[axis];
+  const Eigen::Index beside = cells_[axis] + 1 + 2 * kReach;
+  std::vector<Line> lines;
+  for (int i = 0; i <= cells_[axis]; ++i) lines.push_back({i * step, i + kReach});
+  for (int k = 0; k < kBesideRim; ++k) {
+    const double apart = (k + 1) * kRimSpacing * step;
+    lines.push_back({apart, beside + k});
+    lines.push_back({cells_[axis] * step - apart, beside + kBesideRim + k});
+  }
+  std::sort(lines.begin(), lines.end(),
+            [](const Line& a, const Line& b) { return a.place < b.place; });
+  return lines;
 }
 
 Eigen::MatrixXd AveragingGrid::make_heights() const {
-  return Eigen::MatrixXd::Zero(cells_.x() + 1 + 2 * kReach, cells_.y() + 1 + 2 * kReach);
+  constexpr int kMore = 1 + 2 * (kReach + kBesideRim);
+  return Eigen::MatrixXd::Zero(cells_.x() + kMore, cells_.y() + kMore);
 }
 
 /// f(−t) = f − t f′ + height(t) f″ with one-sided differences.
 AveragingGrid::RimWeights AveragingGrid::rim_weights(int axis) const {
   const Eigen::Vector4d slope = Eigen::Vector4d(-11.0, 18.0, -9.0, 2.0) / 6.0;
   const Eigen::Vector4d bend(2.0, -5.0, 4.0, -1.0);
-  const double step = step_[axis];
+  const double apart = kRimSpacing * step_[axis];
   RimWeights weights;
   for (int k = 1; k <= kReach; ++k) {
-    weights[static_cast<std::size_t>(k - 1)] =
-        Eigen::Vector4d::Unit(0) - k * slope + RunOut{}.height(k * step) / (step * step) * bend;
+    const double beyond = k * step_[axis];
+    weights[static_cast<std::size_t>(k - 1)] = Eigen::Vector4d::Unit(0) - beyond / apart * slope +
+                                               RunOut{}.height(beyond) / (apart * apart) * bend;
   }
   return weights;
 }
@@ -85,15 +110,16 @@ AveragingGrid::RimWeights AveragingGrid::rim_weights(int axis) const {
 namespace {
 
 /// Calls `take(beyond, inside, weight)` for the numbers of every line of samples beyond both rims
-/// of an axis and of those that make it up. @param lines  of the axis, with those beyond.
+/// of an axis and of those that make it up. @param lines  all of the axis.
 template <class Weights, class Take>
 void for_each_beyond(Eigen::Index lines, const Weights& weights, const Take& take) {
-  const Eigen::Index last = lines - 1 - kReach;
+  const Eigen::Index beside = lines - 2 * kBesideRim;
+  const Eigen::Index last = beside - 1 - kReach;
   for (Eigen::Index k = 1; k <= kReach; ++k) {
     const Eigen::Vector4d& w = weights[static_cast<std::size_t>(k - 1)];
     for (Eigen::Index j = 0; j < w.size(); ++j) {
-      take(kReach - k, kReach + j, w[j]);
-      take(last + k, last - j, w[j]);
+      take(kReach - k, j == 0 ? kReach : beside + j - 1, w[j]);
+      take(last + k, j == 0 ? last : beside + kBesideRim + j - 1, w[j]);
     }
   }
 }
@@ -102,13 +128,13 @@ void for_each_beyond(Eigen::Index lines, const Weights& weights, const Take& tak
 
 void AveragingGrid::continue_beyond_rim(Eigen::MatrixXd& heights) const {
   heights.topRows(kReach).setZero();
-  heights.bottomRows(kReach).setZero();
+  heights.middleRows(kReach + cells_.x() + 1, kReach).setZero();
   for_each_beyond(heights.rows(), rim_weights(0),
                   [&](Eigen::Index to, Eigen::Index from, double w) {
                     heights.row(to) += w * heights.row(from);
                   });
   heights.leftCols(kReach).setZero();
-  heights.rightCols(kReach).setZero();
+  heights.middleCols(kReach + cells_.y() + 1, kReach).setZero();
   for_each_beyond(heights.cols(), rim_weights(1),
                   [&](Eigen::Index to, Eigen::Index from, double w) {
                     heights.col(to) += w * heights.col(from);
@@ -164,20 +190,23 @@ Eigen::Matrix2d plan_of(const SplineFrame& frame) {
 MadeSurface::MadeSurface(const ControlNet& net, const MadeBy& made, const Executor& executor)
     : grid_({net.points.row(0).maxCoeff(), net.points.row(1).maxCoeff()}, made),
       heights_(grid_.make_heights()) {
-  const auto sample = [&](std::int64_t row) { sample_row(net, static_cast<int>(row)); };
-  parallel_for(executor, "heights to polish", grid_.cells().y() + 1, sample, 1);
+  const std::vector<AveragingGrid::Line>& rows = grid_.lines(1);
+  const auto sample = [&](std::int64_t row) {
+    sample_row(net, rows[static_cast<std::size_t>(row)]);
+  };
+  parallel_for(executor, "heights to polish", static_cast<std::int64_t>(rows.size()), sample, 1);
   grid_.continue_beyond_rim(heights_);
 }
 
 /// Newton's method from the last sample, and a Taylor expansion over its remaining error.
-void MadeSurface::sample_row(const ControlNet& net, int row) {
+void MadeSurface::sample_row(const ControlNet& net, const AveragingGrid::Line& row) {
   constexpr int kSteps = 2;
   const Eigen::Vector2d high = net.cells().cast<double>();
   Eigen::Vector2d uv =
-      net.parameters_of(grid_.place(0, row), {0.0, high.y() * row / grid_.cells().y()});
+      net.parameters_of({0.0, row.place}, {0.0, high.y() * row.place / grid_.size().y()});
   SplineFrame frame = net.at(uv);
-  for (int i = 0; i <= grid_.cells().x(); ++i) {
-    const Eigen::Vector2d xy = grid_.place(i, row);
+  for (const AveragingGrid::Line& column : grid_.lines(0)) {
+    const Eigen::Vector2d xy(column.place, row.place);
     for (int step = 0; step < kSteps; ++step) {
       uv += plan_of(frame).inverse() * (xy - frame.point.head<2>());
       uv = uv.cwiseMax(0.0).cwiseMin(high);
@@ -185,7 +214,7 @@ void MadeSurface::sample_row(const ControlNet& net, int row) {
     }
     const SurfaceShape shape = frame.shape();
     const Eigen::Vector2d rest = xy - frame.point.head<2>();
-    heights_(i + kReach, row + kReach) =
+    heights_(column.index, row.index) =
         shape.z + rest.dot(shape.slope) + 0.5 * rest.dot(shape.bend * rest);
   }
 }
@@ -307,8 +336,7 @@ MadeNodes::MadeNodes(const GridShape& net, const Eigen::Vector2d& size, int samp
       net_{net, Eigen::Matrix3Xd(3, Eigen::Index{net.columns} * net.rows)},
       plan_(spline_nodes_on(net, samples, executor)),
       heights_(grid_.make_heights()),
-      samples_(static_cast<std::size_t>(grid_.cells().x() + 1) *
-               static_cast<std::size_t>(grid_.cells().y() + 1)),
+      samples_(grid_.lines(0).size() * grid_.lines(1).size()),
       nodes_(static_cast<std::size_t>(shape().columns) * static_cast<std::size_t>(shape().rows)),
       plan_bar_(3 * nodes_.size()),
       no_bar_(3 * nodes_.size(), 0.0) {}
@@ -316,8 +344,8 @@ MadeNodes::MadeNodes(const GridShape& net, const Eigen::Vector2d& size, int samp
 void MadeNodes::look(const double* points, double* positions, double* normals) {
   std::copy_n(points, net_.points.size(), net_.points.data());
   parallel_for(
-      executor_, "heights to polish", grid_.cells().y() + 1,
-      [&](std::int64_t row) { sample_row(static_cast<int>(row)); }, 1);
+      executor_, "heights to polish", static_cast<std::int64_t>(grid_.lines(1).size()),
+      [&](std::int64_t row) { sample_row(static_cast<std::size_t>(row)); }, 1);
   grid_.continue_beyond_rim(heights_);
   known_ = true;
   plan_.look(points, positions, normals);
@@ -352,11 +380,11 @@ Eigen::Vector2d MadeNodes::search(const Eigen::Vector2d& xy, Eigen::Vector2d uv,
   return uv;
 }
 
-void MadeNodes::sample_row(int row) {
-  const double v = static_cast<double>(net_.cells().y()) * row / grid_.cells().y();
-  Eigen::Vector2d before(0.0, v);
-  for (int i = 0; i <= grid_.cells().x(); ++i) {
-    const Eigen::Vector2d xy = grid_.place(i, row);
+void MadeNodes::sample_row(std::size_t row) {
+  const AveragingGrid::Line& line = grid_.lines(1)[row];
+  Eigen::Vector2d before(0.0, net_.cells().y() * line.place / grid_.size().y());
+  for (std::size_t i = 0; i < grid_.lines(0).size(); ++i) {
+    const Eigen::Vector2d xy(grid_.lines(0)[i].place, line.place);
     Sample& s = sample(i, row);
     SplineFrame frame;
     s.uv = search(xy, known_ ? s.uv : before, frame);
@@ -364,7 +392,7 @@ void MadeNodes::sample_row(int row) {
     const SurfaceShape shape = frame.shape();
     const Eigen::Vector2d rest = xy - frame.point.head<2>();
     s.slope = shape.slope + shape.bend * rest;
-    heights_(i + kReach, row + kReach) = shape.z + 0.5 * rest.dot(shape.slope + s.slope);
+    heights_(grid_.lines(0)[i].index, line.index) = shape.z + 0.5 * rest.dot(shape.slope + s.slope);
   }
 }
 
@@ -445,15 +473,17 @@ void MadeNodes::spread_nodes(const double* position_bar, const double* normal_ba
 
 /// Carries derivatives from the heights on the grid to the control points.
 void MadeNodes::spread_samples(double* points_bar) {
-  const std::int64_t rows = grid_.cells().y() + 1;
+  const auto rows = static_cast<std::int64_t>(grid_.lines(1).size());
+  const auto begin = [&](std::int64_t band) {
+    return static_cast<std::size_t>(band_start(band, rows));
+  };
   const int last_cell = net_.cells().y() - 1;
   const auto rows_of = [&](std::int64_t band) {
     int low = last_cell;
     int high = 0;
-    for (std::int64_t row = band_start(band, rows); row < band_start(band + 1, rows); ++row) {
-      for (int i = 0; i <= grid_.cells().x(); ++i) {
-        const int cell =
-            std::clamp(static_cast<int>(sample(i, static_cast<int>(row)).uv.y()), 0, last_cell);
+    for (std::size_t row = begin(band); row < begin(band + 1); ++row) {
+      for (std::size_t i = 0; i < grid_.lines(0).size(); ++i) {
+        const int cell = std::clamp(static_cast<int>(sample(i, row).uv.y()), 0, last_cell);
         low = std::min(low, cell);
         high = std::max(high, cell);
       }
@@ -462,10 +492,10 @@ void MadeNodes::spread_samples(double* points_bar) {
   };
   BandSums sums(Eigen::Index{3} * net_.shape.columns);
   const auto spread = [&](std::int64_t band, BandSums::Band& to) {
-    for (std::int64_t row = band_start(band, rows); row < band_start(band + 1, rows); ++row) {
-      for (int i = 0; i <= grid_.cells().x(); ++i) {
-        const Sample& s = sample(i, static_cast<int>(row));
-        const double z_bar = heights_bar_(i + kReach, row + kReach);
+    for (std::size_t row = begin(band); row < begin(band + 1); ++row) {
+      for (std::size_t i = 0; i < grid_.lines(0).size(); ++i) {
+        const Sample& s = sample(i, row);
+        const double z_bar = heights_bar_(grid_.lines(0)[i].index, grid_.lines(1)[row].index);
         const Eigen::Vector3d point_bar(-s.slope.x() * z_bar, -s.slope.y() * z_bar, z_bar);
         const CubicBasis u = cubic_basis(s.uv.x(), net_.cells().x());
         const CubicBasis v = cubic_basis(s.uv.y(), net_.cells().y());

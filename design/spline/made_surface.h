@@ -35,7 +35,8 @@ struct GaussianWeights {
 };
 
 /// The even grid of heights over a lens whose averages make up a made surface. It includes the
-/// samples beyond the rim that averages at the rim need.
+/// samples beyond the rim that averages at the rim need, and samples next to the rim that give the
+/// surface's own slopes and curvatures there: averages leave those out.
 ///
 /// Samples are at most 3/4 σ apart: the relative error of a wave of wave number k in a Gaussian sum
 /// is then exp(−(2π/0.75 − kσ)²/2).
@@ -46,15 +47,19 @@ class AveragingGrid {
   /// Grid cells over the lens.
   [[nodiscard]] const Eigen::Vector2i& cells() const { return cells_; }
   [[nodiscard]] const Eigen::Vector2d& size() const { return size_; }
-  /// Place of sample (i, j), mm.
-  [[nodiscard]] Eigen::Vector2d place(int i, int j) const {
-    return step_.cwiseProduct(Eigen::Vector2d(i, j));
+  /// Places of samples on the lens along an axis, and their indices in make_heights().
+  struct Line {
+    double place = 0.0;  ///< mm
+    Eigen::Index index = 0;
+  };
+  /// From rim to rim, with those next to both rims.
+  [[nodiscard]] const std::vector<Line>& lines(int axis) const {
+    return lines_[static_cast<std::size_t>(axis)];
   }
 
-  /// Heights of all samples: sample (i, j) of the lens is at (i + kReach, j + kReach).
+  /// Heights of all samples.
   [[nodiscard]] Eigen::MatrixXd make_heights() const;
-  /// Fills the samples beyond the rim as continued_surface() does; slopes and curvatures at the rim
-  /// are those of the cubic through four samples.
+  /// Fills the samples beyond the rim as continued_surface() does.
   void continue_beyond_rim(Eigen::MatrixXd& heights) const;
   /// Adjoint of continue_beyond_rim(); leaves the derivatives by the samples beyond the rim
   /// unchanged.
@@ -80,13 +85,15 @@ class AveragingGrid {
   Eigen::Vector2d sigma_;  ///< mm
   double rim_depth_;
   double rim_length_;
-  /// Weights of the samples 0 … 3 from the rim in those 1 … kReach beyond it.
+  /// Weights of the sample on the rim and of those next to it in those 1 … kReach beyond it.
   using RimWeights = std::array<Eigen::Vector4d, GaussianWeights::kReach>;
 
   [[nodiscard]] RimWeights rim_weights(int axis) const;
+  [[nodiscard]] std::vector<Line> make_lines(int axis) const;
 
   Eigen::Vector2i cells_;
   Eigen::Vector2d step_;  ///< mm
+  std::array<std::vector<Line>, 2> lines_;
 };
 
 /// The surface of a spline after cutting and polishing: the average of the spline with a Gaussian,
@@ -112,7 +119,7 @@ class MadeSurface {
   [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) const;
 
  private:
-  void sample_row(const ControlNet& net, int row);
+  void sample_row(const ControlNet& net, const AveragingGrid::Line& row);
 
   AveragingGrid grid_;
   Eigen::MatrixXd heights_;  ///< AveragingGrid::make_heights()
@@ -160,16 +167,15 @@ class MadeNodes {
     Eigen::Matrix2d bend;
   };
 
-  void sample_row(int row);
+  void sample_row(std::size_t row);
   [[nodiscard]] Eigen::Vector2d search(const Eigen::Vector2d& xy, Eigen::Vector2d uv,
                                        SplineFrame& frame) const;
   void average(std::int64_t node, double* positions, double* normals);
   void spread_nodes(const double* position_bar, const double* normal_bar);
   void spread_samples(double* points_bar);
-  [[nodiscard]] Sample& sample(int i, int row) {
-    return samples_[static_cast<std::size_t>(row) *
-                        static_cast<std::size_t>(grid_.cells().x() + 1) +
-                    static_cast<std::size_t>(i)];
+  /// @param i, row  of AveragingGrid::lines().
+  [[nodiscard]] Sample& sample(std::size_t i, std::size_t row) {
+    return samples_[row * grid_.lines(0).size() + i];
   }
 
   Executor executor_;

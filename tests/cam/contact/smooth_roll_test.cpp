@@ -11,6 +11,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/contact/cut_surface.h"
 #include "cam/contact/drop_cutter.h"
+#include "cam/path/row_fit.h"
 #include "cam/path/row_profile.h"
 #include "core/lens/smooth_surface.h"
 
@@ -224,6 +225,38 @@ TEST(SmoothRoll, LeavesSharpGroovesToTheFacets) {
   for (double u = 0.3; u <= 2.7; u += 0.0013) {
     EXPECT_NEAR(profile.at(u, hint), cutter->drop(line.at(u)).tip,
                 surface.deviation().height + kProfileError);
+  }
+}
+
+/// On a slope the ball reaches the rim before or behind its axis. Over the rim its path bends as
+/// sharply as the ball, which takes shorter moves than a controller may have time for.
+TEST(SmoothRoll, RowsAreJudgedWithinTheRimAlone) {
+  const RowFitOptions options{5e-4, 6e-5, {1e-6, 0.0}, true, 0.009};
+  for (double slope = -0.4; slope <= 0.41; slope += 0.1) {
+    const SurfaceMesh mesh = testing::grid_mesh(4, 4, kSide, kSide, [&](double x, double) {
+      return 5.0 + slope * x - 0.1 * (x - kSide) * x;
+    });
+    Eigen::Matrix2Xd slopes = Eigen::Matrix2Xd::Zero(2, mesh.vertices.cols());
+    slopes.row(0) = (slope + 0.1 * kSide) - 0.2 * mesh.vertices.row(0).array();
+    const SmoothCutSurface surface(std::make_shared<const SmoothSurface>(mesh, slopes), kRadius, {},
+                                   Executor::serial());
+    const auto profile = [&](const AxisLine& line) {
+      const RowSpan span{line, -0.3, kSide + 0.3, -0.14, kSide + 0.14};
+      const Eigen::AlignedBox2d axis(line.at(span.held_from), line.at(span.held_to));
+      return RowCurves(surface, axis, Executor::serial()).profile(span, joint_bow(options));
+    };
+    const RowProfile row = profile({0, 0.03});
+    const auto ahead = [](double steep) { return kRadius * steep / std::hypot(1.0, steep); };
+    const double first = -ahead(slope + 0.1 * kSide);
+    const double last = kSide - ahead(slope - 0.1 * kSide);
+    EXPECT_GE(row.shaped_from, first + 0.02);
+    EXPECT_LE(row.shaped_from, first + 0.05);
+    EXPECT_LE(row.shaped_to, last - 0.02);
+    EXPECT_GE(row.shaped_to, last - 0.05);
+    EXPECT_FALSE(profile({0, -0.1}).shapes(0.5 * kSide));  // All along it there is the rim.
+    RowProfile level = row;
+    level_ends(options.grid, level);
+    EXPECT_LE(fit_row(level, options).certificate.slope.value, options.slope_tolerance) << slope;
   }
 }
 
