@@ -315,8 +315,9 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
       refined(grid, place.cells,
               sample_spacings(options_, optics, passes_on_lens(options_, site_.setup.ground())));
   const std::optional<CastFrame> mould = site_.setup.mould();
-  const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
-                          (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
+  const PolishModel& polish = options_.workshop.polish;
+  const double polished =
+      polish_reach(polish) * polish.sigma + (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   const double beyond = (mould ? mould->scale : 1.0) * polished + passes_.front().tool.diameter;
   const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   const Eigen::AlignedBox2d box =

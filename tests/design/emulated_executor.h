@@ -123,8 +123,8 @@ class EmulatedExecutor {
   using PendingSum = FinishedSum<N>;
 
   static constexpr int kThreads = 128;  ///< Per block, as on the GPU.
-  /// True if arguments are searched for addresses: the compiler can clear the bytes between members,
-  /// which may hold old ones.
+  /// True if arguments are searched for addresses: the compiler can clear the bytes between
+  /// members, which may hold old ones.
 #if __has_builtin(__builtin_clear_padding)
   static constexpr bool kFindsAddresses = true;
 #else
