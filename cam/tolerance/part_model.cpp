@@ -212,18 +212,13 @@ Ripple::Ripple(const Passes& passes, double radius, const PolishTransfer& polish
     double slope = 0.0;
     for (int k = 1; k <= kHarmonics; ++k) {
       const double wave = kTwoPi * k / passes.pitch;
-      const double kept = (1.0 - polish_.floor) * polish_.smoothed(wave);
-      slope -= coefficients[static_cast<std::size_t>(k - 1)] * kept * wave *
+      slope -= coefficients[static_cast<std::size_t>(k - 1)] * polish_.at(wave) * wave *
                std::sin(kTwoPi * k * static_cast<double>(i) / kSlopePlaces);
     }
     slope_.push_back(slope);
     largest_ = std::max(largest_, std::abs(slope));
   }
   slope_.push_back(slope_.front());
-  for (int k = 1; k <= kHarmonics; ++k) {
-    const double slope = coefficients[static_cast<std::size_t>(k - 1)] * kTwoPi * k / passes.pitch;
-    floor_square_ += 0.5 * polish_.floor * polish_.floor * slope * slope;
-  }
 }
 
 double Ripple::slope(double place, const Eigen::Vector2d& surface, int across) const {
@@ -244,7 +239,9 @@ double Ripple::seen_by_disc(double radius) const {
 }
 
 double Ripple::kept(double factor) const {
-  const double t = kTwoPi / pitch_ * polish_.sigma;
+  const double wave = kTwoPi / pitch_;
+  if (polish_.floor > 0.0) return polish_.at(factor * wave) / polish_.at(wave);
+  const double t = wave * polish_.sigma;
   if (polish_.order == kFilmOrder) {
     return std::exp(-0.25 * std::pow(t, 4) * (std::pow(factor, 4) - 1.0));
   }
@@ -258,8 +255,8 @@ struct SceneAxis {
   /// The polish's terms, each with one filter for every node in a cell of the base: the first, or
   /// the first and the middle.
   std::vector<AxisFilters> terms;
-  bool ripples = false;  ///< True if scallops are visible along it.
-  bool rows = false;     ///< True if rows run across it.
+  bool ripples = false;   ///< True if scallops are visible along it.
+  std::int64_t fine = 1;  ///< Parts between nodes in which a floor's scallops are resolved.
 
   [[nodiscard]] std::int64_t parts() const { return std::ssize(terms.front().filters); }
   [[nodiscard]] std::int64_t reach() const { return terms.front().filters.front().reach(); }
@@ -307,7 +304,12 @@ class PartTile {
   void take_off_rim();
   void land();
   void sharpen();
+  /// Movement of the light per slope of the ripple along an axis.
+  [[nodiscard]] Eigen::Vector2d ripple_step(int axis) const;
   void add_ripple(int axis);
+  void deposit_fine(std::int64_t i, std::int64_t j, const FluxAccumulator& image) const;
+  [[nodiscard]] Eigen::Vector2d fine_landing(std::size_t node, const Eigen::Vector2d& share,
+                                             const Eigen::Vector2d& place) const;
   [[nodiscard]] double seen_by_source(int axis) const;
   [[nodiscard]] Eigen::Vector2d place(std::int64_t i, std::int64_t j) const;
   [[nodiscard]] std::size_t index(std::int64_t i, std::int64_t j) const {
@@ -321,6 +323,7 @@ class PartTile {
   std::vector<double> z_, slope_x_, slope_y_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Eigen::Vector2d> landing_;
+  std::array<Eigen::Vector2d, 2> steps_{};  ///< ripple_step() of axes with fine parts.
 };
 
 /// Between four nodes per period of a ripple (PartModel), linear interpolation leaves sinc²(1/4) of
@@ -370,7 +373,14 @@ PartTile::PartTile(const PartScene& scene, const CellRange& cells)
   land();
   sharpen();
   for (int axis = 0; axis < 2; ++axis) {
-    if (scene_.axes[static_cast<std::size_t>(axis)].ripples) add_ripple(axis);
+    const SceneAxis& scene_axis = scene_.axes[static_cast<std::size_t>(axis)];
+    Eigen::Vector2d& step = steps_[static_cast<std::size_t>(axis)];
+    step.setZero();
+    if (scene_axis.ripples && scene_axis.fine > 1) {
+      step = ripple_step(axis);
+    } else if (scene_axis.ripples) {
+      add_ripple(axis);
+    }
   }
 }
 
@@ -495,15 +505,18 @@ void PartTile::sharpen() {
 
 /// The ripple's polish and the light's movement per slope hardly change over a tile: both are taken
 /// in its middle.
-void PartTile::add_ripple(int axis) {
+Eigen::Vector2d PartTile::ripple_step(int axis) const {
   const std::size_t middle = index(x_.count / 2, y_.count / 2);
   const Eigen::Vector2d moved =
       scene_.light.moved_by(points_[middle], {slope_x_[middle], slope_y_[middle]}, axis);
-  if (!moved.allFinite()) return;
+  if (!moved.allFinite()) return Eigen::Vector2d::Zero();
   const double factor =
       scene_.heights.sigma_factor(cells_.column + cells_.columns / 2, cells_.row + cells_.rows / 2);
-  const Eigen::Vector2d step =
-      kRippleGain * scene_.ripple.kept(factor) * seen_by_source(axis) * moved;
+  return scene_.ripple.kept(factor) * seen_by_source(axis) * moved;
+}
+
+void PartTile::add_ripple(int axis) {
+  const Eigen::Vector2d step = kRippleGain * ripple_step(axis);
   for (std::int64_t j = 0; j < y_.count; ++j) {
     for (std::int64_t i = 0; i < x_.count; ++i) {
       const std::size_t n = index(i, j);
@@ -529,10 +542,61 @@ double PartTile::flux_of(std::size_t a, std::size_t b, std::size_t c) const {
   return scene_.light.intake({points_[a], points_[b], points_[c]}) / scene_.whole;
 }
 
+/// Where light lands between nodes.
+/// @param node  at the cell's low corner. @param share  of the cell from there.
+Eigen::Vector2d PartTile::fine_landing(std::size_t node, const Eigen::Vector2d& share,
+                                       const Eigen::Vector2d& place) const {
+  const auto up = static_cast<std::size_t>(x_.count);
+  const auto between = [&](const auto& of) {
+    return ((1.0 - share.y()) * ((1.0 - share.x()) * of(node) + share.x() * of(node + 1)) +
+            share.y() * ((1.0 - share.x()) * of(node + up) + share.x() * of(node + up + 1)))
+        .eval();
+  };
+  Eigen::Vector2d landing = between([&](std::size_t n) { return landing_[n]; });
+  const Eigen::Vector2d slope =
+      between([&](std::size_t n) { return Eigen::Vector2d(slope_x_[n], slope_y_[n]); });
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector2d& step = steps_[static_cast<std::size_t>(axis)];
+    if (!step.isZero()) landing += scene_.ripple.slope(place[axis], slope, axis) * step;
+  }
+  return landing;
+}
+
+/// Deposits a cell in parts of equal light.
+void PartTile::deposit_fine(std::int64_t i, std::int64_t j, const FluxAccumulator& image) const {
+  const std::array<std::int64_t, 2> parts{scene_.axes[0].fine, scene_.axes[1].fine};
+  const Eigen::Vector2d part(1.0 / static_cast<double>(parts[0]),
+                             1.0 / static_cast<double>(parts[1]));
+  const Eigen::Vector2d spacing(x_.spacing, y_.spacing);
+  const std::size_t node = index(i, j);
+  const auto at = [&](std::int64_t s, std::int64_t t) {
+    const Eigen::Vector2d share =
+        part.cwiseProduct(Eigen::Vector2d(static_cast<double>(s), static_cast<double>(t)));
+    return fine_landing(node, share, place(i, j) + share.cwiseProduct(spacing));
+  };
+  const std::size_t opposite = index(i + 1, j + 1);
+  const double flux =
+      0.5 * part.prod() *
+      (flux_of(node, node + 1, opposite) + flux_of(node, opposite, index(i, j + 1)));
+  for (std::int64_t t = 0; t < parts[1]; ++t) {
+    for (std::int64_t s = 0; s < parts[0]; ++s) {
+      const Eigen::Vector2d low = at(s, t);
+      const Eigen::Vector2d high = at(s + 1, t + 1);
+      lensforge::deposit({low, at(s + 1, t), high, flux}, image);
+      lensforge::deposit({low, high, at(s, t + 1), flux}, image);
+    }
+  }
+}
+
 void PartTile::deposit(const FluxAccumulator& image) const {
+  const bool fine = scene_.axes[0].fine * scene_.axes[1].fine > 1;
   const auto up = static_cast<std::size_t>(x_.count);
   for (std::int64_t j = 1; j + 2 < y_.count; ++j) {
     for (std::int64_t i = 1; i + 2 < x_.count; ++i) {
+      if (fine) {
+        deposit_fine(i, j, image);
+        continue;
+      }
       const std::size_t a = index(i, j);
       const std::size_t c = a + up + 1;
       lensforge::deposit({landing_[a], landing_[a + 1], landing_[c], flux_of(a, a + 1, c)}, image);
@@ -591,10 +655,17 @@ PartNodes light_nodes(const BaseHeights& base) {
 }
 
 /// Across rows with a ripple there are four nodes per pitch.
-SceneAxis scene_axis(const BaseAxis& axis, const PolishTransfer& transfer, bool ripples,
-                     bool rows) {
+SceneAxis scene_axis(const BaseAxis& axis, const PolishTransfer& transfer, bool ripples) {
   const LinePolish polish{transfer.sigma, axis.spacing, axis.box(), 2 * axis.half};
-  return {polish_filters(transfer, polish, ripples ? 2 : 1), ripples, rows};
+  return {polish_filters(transfer, polish, ripples ? 2 : 1), ripples};
+}
+
+/// What a floor leaves of scallops is no sine that four nodes per pitch could carry: the space
+/// between nodes is divided.
+std::int64_t fine_parts(const SceneAxis& axis, const BaseAxis& base, double pitch) {
+  constexpr double kPerPitch = 24.0;  // As cam_options.cpp samples such a part.
+  const double spacing = base.spacing / static_cast<double>(axis.parts());
+  return std::max<std::int64_t>(1, std::llround(kPerPitch * spacing / pitch));
 }
 
 /// Where boxes hold several pitches, these are so much finer than σ that no ripple is left: less
@@ -631,17 +702,14 @@ FluxPicture cropped(const FluxRaster& raster, std::int64_t margin) {
 
 /// Radii along x and y of the spot lit by a point of the part: that of the source, increased along
 /// a ripple that the source sees only in part (PartTile) so that the variance is that of the whole
-/// ripple, and by what a floor leaves of the scallops. A disc's variance along an axis is a quarter
-/// of its radius squared.
+/// ripple.
 Eigen::Vector2d blur_radii(const PartScene& scene, const Eigen::Vector2d& scale,
                            const Eigen::Vector3d& middle) {
   Eigen::Vector2d square = scene.source.cwiseAbs2();
   const Eigen::Vector2d slope = scene.light.slope_of_middle(middle.z());
   for (int axis = 0; axis < 2; ++axis) {
-    if (!scene.axes[static_cast<std::size_t>(axis)].rows) continue;
-    const Eigen::Vector2d moved = scene.light.moved_by(middle, slope, axis);
-    square += 4.0 * scene.ripple.floor_square() * moved.cwiseAbs2();
     if (!scene.axes[static_cast<std::size_t>(axis)].ripples) continue;
+    const Eigen::Vector2d moved = scene.light.moved_by(middle, slope, axis);
     const double seen = scene.ripple.seen_by_disc(scene.source[axis] / scale[axis]);
     const double far = scene.ripple.largest() * moved[axis];
     square[axis] += 2.0 * far * far * (1.0 - seen * seen);
@@ -669,7 +737,11 @@ FluxPicture PartModel::render(const PartError& error, const Executor& executor) 
   const Ripple ripple(passes, passes.ball_radius + error.radius, polish);
   const auto axis = [&](int k) {
     const bool across = k != passes.axis || passes.cross;
-    return scene_axis(base_.axis(k), polish, across && ripples(base_.axis(k), passes), across);
+    const bool floor = polish.floor > 0.0;
+    SceneAxis scene =
+        scene_axis(base_.axis(k), polish, across && (floor || ripples(base_.axis(k), passes)));
+    if (across && floor) scene.fine = fine_parts(scene, base_.axis(k), passes.pitch);
+    return scene;
   };
   PartScene scene{base_,
                   heights,
@@ -681,9 +753,7 @@ FluxPicture PartModel::render(const PartError& error, const Executor& executor) 
                   0,
                   light.whole(lit_),
                   light.source_radii(error.source, mean_height_)};
-  if (scene.source.isZero() && plan_.polish.floor == 0.0) {
-    return cropped(render_tiles(scene, plan_.optics.pixels, executor), 0);
-  }
+  if (scene.source.isZero()) return cropped(render_tiles(scene, plan_.optics.pixels, executor), 0);
   const Eigen::Vector2d& size = plan_.optics.lens_size;
   const Eigen::Vector3d middle(0.5 * size.x(), 0.5 * size.y(), mean_height_);
   const Eigen::Vector2d scale = plan_.optics.pixels.cast<double>().cwiseQuotient(size);

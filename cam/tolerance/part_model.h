@@ -61,10 +61,8 @@ std::vector<AxisFilters> polish_filters(const PolishTransfer& transfer, const Li
                                         std::int64_t shifts);
 
 /// The slopes across the rows that remain of a raster's scallops after polishing: over a period p,
-/// the k-th harmonic of the ball's profile keeps (1 − floor) exp(−(σ 2πk / √2p)^order) of its
-/// height. What the floor keeps of the profile is no wave that a few nodes per pitch could carry:
-/// it only spreads light (floor_square()). For crossing rows it uses the mean of what the second
-/// raster leaves of each scallop.
+/// the k-th harmonic of the ball's profile keeps T(2πk/p) of its height (PolishTransfer). For
+/// crossing rows it uses the mean of what the second raster leaves of each scallop.
 class Ripple {
  public:
   /// @param radius  of the actual ball, mm.
@@ -84,9 +82,6 @@ class Ripple {
   /// 2 J₁(x) / x with x = 2π radius / p.
   [[nodiscard]] double seen_by_disc(double radius) const;
 
-  /// Mean square of the slopes that the polish's floor keeps.
-  [[nodiscard]] double floor_square() const { return floor_square_; }
-
   /// Maximum slope; rows closer than σ leave almost none.
   [[nodiscard]] double largest() const { return largest_; }
 
@@ -96,7 +91,6 @@ class Ripple {
   PolishTransfer polish_;
   double sign_;  ///< −1 in a mould, where rows leave ridges.
   double largest_ = 0.0;
-  double floor_square_ = 0.0;
   std::vector<double> slope_;  ///< At equal parts of a period, starting at the lowest place.
 };
 

@@ -270,8 +270,7 @@ TEST_F(PartModelTest, AnotherPolishChangesItAsInTheChain) {
   }
 }
 
-/// A film, and both orders with a floor, whose scallops stay in part: 3.6 rows a pixel are few for
-/// the blur that stands for them.
+/// A film, and both orders with a floor, whose scallops stay in part.
 TEST_F(PartModelTest, PartsOfOtherPolishesAreThoseOfTheChain) {
   for (const auto& [order, floor] : {std::pair(4, 0.0), {2, 0.03}, {4, 0.03}}) {
     SCOPED_TRACE(std::to_string(order) + " floor " + std::to_string(floor));
@@ -290,10 +289,10 @@ TEST_F(PartModelTest, PartsOfOtherPolishesAreThoseOfTheChain) {
       const FieldRenderSetup as_cam{setup(), lens_grid(setup().lens_size, kPitch / samples)};
       const PictureQuality by_chain = judged(render_field(part, as_cam, executor(), {}));
       const PictureQuality by_model = judged(model.render(error, executor()));
-      const double more = floor > 0.0 ? 1.0 : 0.0;
-      EXPECT_NEAR(by_model.metrics.mae, by_chain.metrics.mae, 2e-4 + 6e-4 * more) << factor;
-      EXPECT_NEAR(by_model.leakage, by_chain.leakage, 0.1 * by_chain.leakage + 1e-3 * more)
+      EXPECT_NEAR(by_model.metrics.mae, by_chain.metrics.mae,
+                  std::max(5e-4, 0.1 * by_chain.metrics.mae))
           << factor;
+      EXPECT_NEAR(by_model.leakage, by_chain.leakage, 0.2 * by_chain.leakage) << factor;
     }
   }
 }
