@@ -16,7 +16,7 @@
 #include "cam/job/job_files.h"
 #include "cam/plan/cam_options.h"
 #include "cam/plan/finishing.h"
-#include "cam/report/report_json.h"
+#include "cam/report/report_data.h"
 #include "cam/report/verdict.h"
 #include "core/error.h"
 #include "core/io/files.h"

@@ -24,7 +24,7 @@ void describe(Description& d, CouponSettings& settings) {
       .needed = true;
   d.text("--fit", settings.fit, "FILE.toml",
          "fit the workshop to these readings of a coupon instead of making one: polish.sigma, "
-         "the finishing ball's diameter and finish.pitch_error");
+         "polish.order, polish.floor, the finishing ball's diameter and finish.pitch_error");
   d.text("--workshop", settings.workshop, "FILE.toml",
          "the workshop that cuts the coupon; the fitted one differs from it in these values "
          "only");
@@ -56,9 +56,12 @@ nlohmann::json value_json(const FittedValue& value) {
 
 nlohmann::json values_json(const CouponFit& fit) {
   nlohmann::json json;
-  for (const FittedValue* value : {&fit.sigma, &fit.diameter, &fit.pitch_error}) {
+  for (const FittedValue* value : {&fit.sigma, &fit.floor, &fit.diameter, &fit.pitch_error}) {
     json[value->key] = value_json(*value);
   }
+  json[fit.order.key] = {{"value", static_cast<int>(fit.order.value)},
+                         {"determined", fit.order.determined}};
+  if (fit.order.determined) json[fit.order.key]["standard_errors"] = fit.order_apart;
   return json;
 }
 
@@ -68,6 +71,21 @@ std::string value_text(const FittedValue& value) {
          (value.determined ? number + " ± " + number_text(value.uncertainty, 2)
                            : number + ", not determined by these readings, as it was") +
          "\n";
+}
+
+std::string order_text(const CouponFit& fit) {
+  const std::string number = number_text(fit.order.value, 1);
+  return "  " + fit.order.key + std::string(20 - fit.order.key.size(), ' ') +
+         (fit.order.determined
+              ? number + ", by " + number_text(fit.order_apart, 2) + " standard errors"
+              : number + ", not determined by these readings, as it was") +
+         "\n";
+}
+
+/// The workshop's values that readings determine.
+std::string values_text(const CouponFit& fit) {
+  return value_text(fit.sigma) + order_text(fit) + value_text(fit.floor) +
+         value_text(fit.diameter) + value_text(fit.pitch_error);
 }
 
 std::string reading_text(const FittedReading& reading) {
@@ -89,8 +107,7 @@ CommandResult fit(CommandFrame& frame, const CouponSettings& settings) {
                          {"chi_square", result.chi_square},
                          {"degrees_of_freedom", result.freedom},
                          {"readings", nlohmann::json::array()}};
-  std::string text = settings.out + ": the workshop as fitted\n" + value_text(result.sigma) +
-                     value_text(result.diameter) + value_text(result.pitch_error);
+  std::string text = settings.out + ": the workshop as fitted\n" + values_text(result);
   if (result.touch_off.determined) {
     json["touch_off_mm"] = value_json(result.touch_off);
     text += value_text(result.touch_off);
@@ -109,8 +126,7 @@ CommandResult fit(CommandFrame& frame, const CouponSettings& settings) {
 std::string coupon_text(const CouponSettings& settings, const CouponResult& result) {
   std::string text = settings.out + ": a coupon, " + fixed(result.minutes, 1) + " min\n";
   for (const fs::path& file : result.files) text += "  " + file.filename().string() + "\n";
-  return text + "  what all its readings will tell:\n" + value_text(result.known.sigma) +
-         value_text(result.known.diameter) + value_text(result.known.pitch_error);
+  return text + "  what all its readings will tell:\n" + values_text(result.known);
 }
 
 nlohmann::json coupon_json(const OptionSet& options, const CouponResult& result) {

@@ -74,7 +74,9 @@ MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
                     shop.polish.sigma,
                     shop.polish.rim_depth,
                     shop.polish.rim_length,
-                    settings.robust ? shop.tolerances.polish_sigma : 0.0};
+                    settings.robust ? shop.tolerances.polish_sigma : 0.0,
+                    shop.polish.order,
+                    shop.polish.floor};
   return cut.part == PartKind::kMould ? made.cast(cut.shrinkage) : made;
 }
 
@@ -402,6 +404,8 @@ nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) 
   return {{"pitch_mm", process.pitch},
           {"along", process.rows_along_x ? "x" : "y"},
           {"polish_sigma_mm", process.polish_sigma},
+          {"polish_order", process.polish_order},
+          {"polish_floor", process.polish_floor},
           {"rim_depth_mm", process.rim_depth},
           {"rim_length_mm", process.rim_length},
           {"polish_spread", process.polish_spread},

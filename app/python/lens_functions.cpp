@@ -23,7 +23,7 @@
 #include "app/python/keywords.h"
 #include "cam/cam.h"
 #include "cam/job/job_files.h"
-#include "cam/report/report_json.h"
+#include "cam/report/report_data.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/lens_folder.h"

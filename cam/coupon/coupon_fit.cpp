@@ -18,6 +18,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
+#include "core/optics/polish_transfer.h"
 #include "core/schema/toml.h"
 #include "core/text/number_text.h"
 #include "core/text/printable.h"
@@ -218,7 +219,7 @@ void require_plausible(const std::vector<ModelledReading>& readings, const Coupo
   }
 }
 
-enum Parameter { kSigma, kRadius, kPitchError, kOffset, kParameters };
+enum Parameter { kSigma, kRadius, kPitchError, kOffset, kFloor };
 
 // Range of σ for the search: outside it no ripple is changed, or none is left.
 constexpr double kMinSigma = 0.002;  ///< mm
@@ -227,22 +228,24 @@ constexpr double kNoSigma = 1e-6;    ///< mm; in place of 0, which has no logari
 constexpr int kSigmas = 161;         ///< In equal ratios of 1.03.
 constexpr std::size_t kStarts = 4;   ///< Number of them followed to their minimum.
 
-CouponState state_of(const Eigen::VectorXd& p) {
-  return {std::exp(p[kSigma]), std::exp(p[kRadius]), p[kPitchError], p[kOffset]};
+using Parameters = Eigen::Vector<double, 5>;
+
+CouponState state_of(const Eigen::VectorXd& p, int order) {
+  return {std::exp(p[kSigma]), std::exp(p[kRadius]), p[kPitchError], p[kOffset], p[kFloor], order};
 }
 
 Eigen::VectorXd parameters_of(const CouponState& state) {
-  return Eigen::Vector4d(std::log(std::max(state.sigma, kNoSigma)), std::log(state.radius),
-                         state.pitch_error, state.groove_offset);
+  return Parameters(std::log(std::max(state.sigma, kNoSigma)), std::log(state.radius),
+                    state.pitch_error, state.groove_offset, state.floor);
 }
 
 /// Deviations of readings from a state, in their uncertainties.
-LeastSquares problem_of(const std::vector<ModelledReading>& readings) {
+LeastSquares problem_of(const std::vector<ModelledReading>& readings, int order) {
   LeastSquares problem;
-  problem.steps = Eigen::Vector4d(1e-4, 1e-5, 1e-6, 1e-6);
-  problem.longest = Eigen::Vector4d(0.5, 0.2, 0.01, 0.02);
-  problem.residuals = [&readings](const Eigen::VectorXd& p) {
-    const CouponState state = state_of(p);
+  problem.steps = Parameters(1e-4, 1e-5, 1e-6, 1e-6, 1e-5);
+  problem.longest = Parameters(0.5, 0.2, 0.01, 0.02, 0.05);
+  problem.residuals = [&readings, order](const Eigen::VectorXd& p) {
+    const CouponState state = state_of(p, order);
     Eigen::VectorXd residuals(static_cast<Eigen::Index>(readings.size()));
     for (std::size_t i = 0; i < readings.size(); ++i) {
       const Reading& reading = readings[i].reading;
@@ -312,9 +315,11 @@ std::vector<int> touched(const CouponReadings& readings) {
 
 /// A problem with its minimum.
 struct Solution {
+  int order = kPadOrder;
   LeastSquares problem;
   Eigen::VectorXd best;
   FitQuality quality;
+  double chi_square = 0.0;
 
   /// Index of a parameter among the free ones; none where it is held.
   [[nodiscard]] std::optional<Eigen::Index> place(int parameter) const {
@@ -322,9 +327,11 @@ struct Solution {
     if (at == problem.free.end()) return std::nullopt;
     return at - problem.free.begin();
   }
-  void solve(const CouponState& own) {
-    best = best_fit(problem, parameters_of(own));
+  void solve(const CouponState& own) { settle(best_fit(problem, parameters_of(own))); }
+  void settle(const Eigen::VectorXd& minimum) {
+    best = minimum;
     quality = fit_quality(problem, best);
+    chi_square = problem.residuals(best).squaredNorm();
   }
 };
 
@@ -389,9 +396,12 @@ FittedValue value_of(const Solution& solution, Parameter parameter, double unit,
 CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponState& own,
                     const Solution& solution) {
   CouponFit fit;
-  const CouponState state = state_of(solution.best);
+  const CouponState state = state_of(solution.best, solution.order);
   const double diameter = 2.0 * state.radius;
   fit.sigma = value_of(solution, kSigma, state.sigma, {"polish.sigma", own.sigma}, state.sigma);
+  fit.floor =
+      value_of(solution, kFloor, 1.0, {"polish.floor", own.floor}, std::max(0.0, state.floor));
+  fit.order = {"polish.order", static_cast<double>(solution.order)};
   fit.diameter =
       value_of(solution, kRadius, diameter, {"tool.diameter", 2.0 * own.radius}, diameter);
   fit.pitch_error = value_of(solution, kPitchError, 1.0, {"finish.pitch_error", own.pitch_error},
@@ -404,7 +414,7 @@ CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponSt
     fit.readings.push_back({one.key, one.reading.value / one.unit, one.predicted(state) / one.unit,
                             -residuals[static_cast<Eigen::Index>(i)]});
   }
-  fit.chi_square = residuals.squaredNorm();
+  fit.chi_square = solution.chi_square;
   fit.freedom = static_cast<int>(readings.size()) - static_cast<int>(solution.problem.free.size());
   return fit;
 }
@@ -413,6 +423,8 @@ CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponSt
 
 Workshop CouponFit::applied_to(Workshop workshop) const {
   if (sigma.determined) workshop.polish.sigma = sigma.value;
+  if (sigma.determined) workshop.polish.order = static_cast<int>(order.value);
+  if (floor.determined) workshop.polish.floor = floor.value;
   if (pitch_error.determined) workshop.process.finish.pitch_error = pitch_error.value;
   for (Tool& tool : workshop.tools) {
     if (diameter.determined && tool.number == workshop.process.finish.tool) {
@@ -422,24 +434,76 @@ Workshop CouponFit::applied_to(Workshop workshop) const {
   return workshop;
 }
 
+namespace {
+
+constexpr double kFloorStart = 0.02;  ///< Of a search for a floor.
+
+/// The fit of these parameters, less those that the readings do not determine.
+Solution solved_with(const std::vector<ModelledReading>& readings, const CouponState& own,
+                     int order, std::vector<int> free) {
+  Solution solution{order, problem_of(readings, order), {}, {}};
+  solution.problem.free = std::move(free);
+  solution.solve(own);
+  for (int held = unknown_among(solution); held >= 0; held = unknown_among(solution)) {
+    std::erase(solution.problem.free, held);
+    solution.solve(own);
+  }
+  return solution;
+}
+
+/// The fit for one order: with the floor free where that makes a difference or the workshop has
+/// one.
+Solution solved(const std::vector<ModelledReading>& readings, const CouponState& own, int order,
+                const std::vector<int>& free) {
+  Solution held = solved_with(readings, own, order, free);
+  if (!held.place(kSigma)) return held;
+  Solution open = held;
+  open.problem.free.push_back(kFloor);
+  Eigen::VectorXd begin = held.best;
+  begin[kFloor] = std::max(begin[kFloor], kFloorStart);
+  open.settle(minimize(open.problem, begin));
+  if (!(open.quality.uncertainties[*open.place(kFloor)] <= kFloorMost)) return held;
+  const bool better = held.chi_square - open.chi_square > kPreference * kPreference;
+  return own.floor > 0.0 || (better && open.best[kFloor] > 0.0) ? open : held;
+}
+
+/// The order that the readings prefer, by how many standard errors. @return that of the workshop if
+/// they prefer neither.
+std::pair<Solution, double> preferred(const std::vector<ModelledReading>& readings,
+                                      const CouponState& own, const std::vector<int>& free) {
+  Solution pads = solved(readings, own, kPadOrder, free);
+  Solution film = solved(readings, own, kFilmOrder, free);
+  const double apart = std::sqrt(std::abs(pads.chi_square - film.chi_square));
+  const bool known = apart >= kPreference && pads.place(kSigma) && film.place(kSigma);
+  const int order =
+      known ? (film.chi_square < pads.chi_square ? kFilmOrder : kPadOrder) : own.order;
+  return {order == kFilmOrder ? film : pads, known ? apart : 0.0};
+}
+
+}  // namespace
+
 CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
-                     const std::string& file) {
+                     const std::string& file, std::optional<int> order) {
   const std::vector<ModelledReading> modelled = modelled_readings(readings);
   if (modelled.empty()) {
     throw InputError(file + ": 0 readings: fill in at least one, and take the # away before it");
   }
   const CouponState own = CouponState::of(workshop);
   require_plausible(modelled, own, file);
-  Solution solution{problem_of(modelled), {}, {}};
-  solution.problem.free = touched(readings);
-  solution.solve(own);
-  for (int held = unknown_among(solution); held >= 0; held = unknown_among(solution)) {
-    std::erase(solution.problem.free, held);
-    solution.solve(own);
+  const std::vector<int> free = touched(readings);
+  auto [solution, apart] =
+      order ? std::pair(solved(modelled, own, *order, free), 0.0) : preferred(modelled, own, free);
+  if (solution.quality.deletion.cwiseAbs().maxCoeff() > kMaxDeviation) {
+    // A wrong reading may look like another polish: the workshop's own names it.
+    require_agreement(modelled, solved_with(modelled, own, order.value_or(own.order), free).quality,
+                      file);
   }
   require_agreement(modelled, solution.quality, file);
   take_in_ball(solution);
-  return result_of(modelled, own, solution);
+  CouponFit fit = result_of(modelled, own, solution);
+  fit.order.determined = apart > 0.0;
+  fit.order_apart = apart;
+  return fit;
 }
 
 CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop) {
@@ -505,6 +569,12 @@ std::optional<std::string> edited_workshop(const std::string& text, const Worksh
     if (from.polish.sigma != to.polish.sigma) {
       set_number(edited, "polish", "sigma", to.polish.sigma);
     }
+    if (from.polish.order != to.polish.order) {
+      set_number(edited, "polish", "order", to.polish.order);
+    }
+    if (from.polish.floor != to.polish.floor) {
+      set_number(edited, "polish", "floor", to.polish.floor);
+    }
     if (from.process.finish.pitch_error != finish.pitch_error) {
       set_number(edited, "finish", "pitch_error", finish.pitch_error);
     }
@@ -524,8 +594,8 @@ constexpr std::size_t kLongestName = 200;  ///< Of the readings' file, in a comm
 constexpr std::string_view kFitted = "# Fitted by ";
 constexpr std::string_view kValue = "#   ";
 
-std::array<const FittedValue*, 3> values_of(const CouponFit& fit) {
-  return {&fit.sigma, &fit.diameter, &fit.pitch_error};
+std::array<const FittedValue*, 5> values_of(const CouponFit& fit) {
+  return {&fit.sigma, &fit.order, &fit.floor, &fit.diameter, &fit.pitch_error};
 }
 
 bool determines_any(const CouponFit& fit) {
@@ -535,15 +605,19 @@ bool determines_any(const CouponFit& fit) {
   return false;
 }
 
+std::string sureness(const CouponFit& fit, const FittedValue& value) {
+  return &value == &fit.order ? ", by " + number_text(fit.order_apart, 2) + " standard errors"
+                              : " +- " + number_text(value.uncertainty, 2);
+}
+
 /// Comments that state the fitted values and their source.
 std::string fitted_text(const CouponFit& fit, const std::string& readings) {
   std::string text =
       "# Fitted by " + program_mark() + " to " + printable_line(readings, kLongestName) + ":\n";
   for (const FittedValue* value : values_of(fit)) {
     text += std::string(kValue) + value->key +
-            (value->determined
-                 ? " = " + number_text(value->value) + " +- " + number_text(value->uncertainty, 2)
-                 : " is not determined, left as it was") +
+            (value->determined ? " = " + number_text(value->value) + sureness(fit, *value)
+                               : " is not determined, left as it was") +
             "\n";
   }
   return text;

@@ -59,7 +59,12 @@ struct FittedReading {
 
 /// Workshop values determined by the readings of a coupon that it cut.
 struct CouponFit {
-  FittedValue sigma, diameter, pitch_error;
+  FittedValue sigma, floor, diameter, pitch_error;
+  /// polish.order: 2 or 4. Its uncertainty is 0; `order_apart` says how sure it is.
+  FittedValue order;
+  /// By how many standard errors the readings prefer this order to the other: √ of the difference
+  /// of both chi squares.
+  double order_apart = 0.0;
   FittedValue touch_off;  ///< Excess depth of grooves over the program, mm; not of a workshop.
   std::vector<FittedReading> readings;
   double chi_square = 0.0;  ///< Σ deviation²
@@ -69,7 +74,11 @@ struct CouponFit {
   [[nodiscard]] Workshop applied_to(Workshop workshop) const;
 };
 
+/// Standard errors by which an order, or a floor other than the workshop's, must be preferred.
+inline constexpr double kPreference = 3.0;
+
 /// A value counts as determined if its standard uncertainty is at most this.
+inline constexpr double kFloorMost = 0.05;       ///< Of a ripple; pads leave a few hundredths.
 inline constexpr double kSigmaShare = 0.25;      ///< Of σ; as good as a guess.
 inline constexpr double kRadiusShare = 0.05;     ///< Of R; makers of small balls keep to 2 to 5 %.
 inline constexpr double kPitchErrorMost = 2e-3;  ///< Of a length; a worse machine shows at once.
@@ -79,15 +88,19 @@ inline constexpr double kPitchErrorMost = 2e-3;  ///< Of a length; a worse machi
 inline constexpr double kMaxDeviation = 4.0;
 
 /// Weighted least squares over ln σ, ln R, pitch error and touch-off, by Levenberg-Marquardt steps
-/// from several σ, because an order's light is not monotone in its ripple. Uncertainties are those
-/// of the readings, propagated through the linearised model. Values that the readings do not
-/// determine (the limits above; the radius is given up before σ) keep the workshop's value; σ's
-/// uncertainty then includes an error of kRadiusShare of a fixed ball.
-/// @param file  of the readings, for messages.
+/// from several σ, because an order's light is not monotone in its ripple; for both orders of the
+/// polish, and with the floor as the workshop's or free. A floor is taken where it lowers chi
+/// square by kPreference², then the order of the lower chi square; if that is not lower by
+/// kPreference² the workshop's order stays. Uncertainties are those of the readings, propagated
+/// through the linearised model. Values that the readings do not determine (the limits above; the
+/// radius is given up before σ) keep the workshop's value; σ's uncertainty then includes an error
+/// of kRadiusShare of a fixed ball.
+/// @param file   of the readings, for messages.
+/// @param order  of the polish, if it is known.
 /// @throw InputError naming the file and a reading: no readings at all; a value impossible for a
 ///        coupon of such a workshop (wrong unit); readings that contradict one another.
 CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
-                     const std::string& file);
+                     const std::string& file, std::optional<int> order = std::nullopt);
 
 /// Fit of readings that all equal their expected values: it has the same uncertainties.
 CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop);

@@ -505,11 +505,15 @@ std::string known(const CouponFit& fit) {
       words("the ball's diameter", fit.diameter, rough_um(fit.diameter.uncertainty));
   const std::string pitch = words("the pitch error", fit.pitch_error,
                                   number_text(100.0 * fit.pitch_error.uncertainty, 2) + " %");
+  const std::string order = fit.order.determined
+                                ? "; it tells the order of the polish by " +
+                                      number_text(fit.order_apart, 2) + " standard errors"
+                                : "; it does not tell the order of the polish";
   return element(
       "p", "",
       escape_html("With every reading of this sheet, and the uncertainties that the file "
                   "states, the fit tells " +
-                  sigma + ", " + ball + " and " + pitch + "."));
+                  sigma + ", " + ball + " and " + pitch + order + "."));
 }
 
 /// Distance of the first spot from the middle one on the first pad, a metre behind it.

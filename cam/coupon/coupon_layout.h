@@ -51,7 +51,7 @@ struct CouponPad {
 /// - Grooves of one pass each at several depths: their widths give the ball's radius, independently
 ///   of the touch-off error.
 /// - Pads: the scallops' heights p²/(8R) before polishing also give the radius; the ripples after
-///   polishing, smaller by exp(−2π²σ²/p²), give σ.
+///   polishing, smaller by the transfer function at 2π/p, give σ, order and floor.
 struct CouponLayout {
   int along = 0;        ///< Axis of the passes: 0 for x, 1 for y.
   double radius = 0.0;  ///< Of the ball, from the workshop.

@@ -45,16 +45,15 @@ double scallop_height(double radius, double pitch) {
   return pitch >= 2.0 * radius ? radius : ball_height(radius, 0.5 * pitch);
 }
 
-PolishedScallop::PolishedScallop(double radius, double pitch, double sigma) {
+PolishedScallop::PolishedScallop(double radius, double pitch, const PolishTransfer& polish) {
   const auto& cosine = cosines<kNodes>();
   std::array<double, kNodes> raw{};
   for (std::size_t j = 0; j < kNodes; ++j) {
     const double share = static_cast<double>(std::min(j, kNodes - j)) / kNodes;
     raw[j] = ball_height(radius, std::min(share * pitch, radius));
   }
-  const double ratio = std::numbers::pi * sigma / pitch;
   for (std::size_t n = 0; n < kHarmonics; ++n) {
-    const double left = std::exp(-2.0 * std::pow(static_cast<double>(n) * ratio, 2));
+    const double left = polish.at(2.0 * std::numbers::pi * static_cast<double>(n) / pitch);
     if (left < 1e-18) break;  // Below the last bit of the first harmonic.
     double sum = 0.0;
     for (std::size_t j = 0; j < kNodes; ++j) sum += raw[j] * cosine[n * j % kNodes];
@@ -87,7 +86,9 @@ double PolishedScallop::order_ratio(double phase) const {
 
 CouponState CouponState::of(const Workshop& workshop) {
   const FinishProcess& finish = workshop.process.finish;
-  return {workshop.polish.sigma, workshop.tool(finish.tool).radius(), finish.pitch_error, 0.0};
+  return {workshop.polish.sigma, workshop.tool(finish.tool).radius(),
+          finish.pitch_error,    0.0,
+          workshop.polish.floor, workshop.polish.order};
 }
 
 double CouponState::mark_distance(double programmed) const {
@@ -103,11 +104,12 @@ double CouponState::scallop_before(double pitch) const {
 }
 
 double CouponState::scallop_after(double pitch) const {
-  return PolishedScallop(radius, (1.0 + pitch_error) * pitch, sigma).height();
+  return PolishedScallop(radius, (1.0 + pitch_error) * pitch, {sigma, order, floor}).height();
 }
 
 double CouponState::order_ratio(double pitch, const CouponLight& light) const {
-  return PolishedScallop(radius, (1.0 + pitch_error) * pitch, sigma).order_ratio(light.phase());
+  const PolishedScallop ripples(radius, (1.0 + pitch_error) * pitch, {sigma, order, floor});
+  return ripples.order_ratio(light.phase());
 }
 
 namespace {

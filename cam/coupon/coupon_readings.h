@@ -11,6 +11,7 @@
 
 #include "cam/coupon/coupon_layout.h"
 #include "cam/workshop/workshop.h"
+#include "core/optics/polish_transfer.h"
 
 namespace lensforge {
 
@@ -32,11 +33,11 @@ double groove_width(double radius, double depth);
 double scallop_height(double radius, double pitch);
 
 /// The profile across the passes of a ball on a plane after polishing: arcs of radius R, repeated
-/// every p, averaged with a Gaussian, which leaves exp(−2π²n²σ²/p²) of the n-th harmonic.
+/// every p, of whose n-th harmonic the polish leaves T(2πn/p).
 class PolishedScallop {
  public:
-  /// mm. @pre radius > 0, pitch > 0, sigma ≥ 0.
-  PolishedScallop(double radius, double pitch, double sigma);
+  /// mm. @pre radius > 0, pitch > 0.
+  PolishedScallop(double radius, double pitch, const PolishTransfer& polish);
 
   /// From valley to crest, mm; relative error below 3e-4 for σ from 0.02 to 0.5 p (test
   /// CouponModel.PolishedScallops…).
@@ -63,6 +64,8 @@ struct CouponState {
   double radius = 0.2;         ///< Of the ball as it cuts, run-out and wear included.
   double pitch_error = 0.0;    ///< Share of a length, across the passes.
   double groove_offset = 0.0;  ///< Excess depth of grooves over the program: the touch-off.
+  double floor = 0.0;          ///< Of the polish; share of a ripple.
+  int order = kPadOrder;       ///< Of the polish.
 
   /// Values of the workshop's file.
   static CouponState of(const Workshop& workshop);

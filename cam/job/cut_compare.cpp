@@ -12,6 +12,7 @@
 #include "cam/report/report_html.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/optics/polish_transfer.h"
 #include "core/text/number_text.h"
 #include "core/text/units.h"
 #include "core/text/words.h"
@@ -273,7 +274,9 @@ CutComparison compare_cuts(const Lens& lens, const CamOptions& options, const Cu
   page.parameters = {
       {"Compared",
        {{"Operations", "finishing only"},
-        {"Polishing, Gaussian σ", trimmed_decimal(options.workshop.polish.sigma, 4) + " mm"}}}};
+        {options.workshop.polish.order == kFilmOrder ? "Polishing, film of order 4, σ"
+                                                     : "Polishing, Gaussian σ",
+         trimmed_decimal(options.workshop.polish.sigma, 4) + " mm"}}}};
   if (!comparison.advice.empty()) {
     page.parameters.front().parameters.push_back({"Recommendation", comparison.advice});
   }

@@ -12,6 +12,7 @@
 #include "core/io/lens_folder.h"
 #include "core/optics/front.h"
 #include "core/optics/light_path.h"
+#include "core/optics/polish_transfer.h"
 #include "core/optics/refraction.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
@@ -338,10 +339,15 @@ std::string sampling_words(const CutSetup& setup) {
 
 ParameterGroup polish_parameters(const CutSetup& setup) {
   const CamOptions& options = setup.options;
+  const PolishModel& polish = options.workshop.polish;
+  const bool film = polish.order == kFilmOrder;
   ParameterGroup group{"Polishing, as assumed",
-                       {{"Gaussian σ", mm(options.workshop.polish.sigma, 3)},
+                       {{film ? "Film of order 4, σ" : "Gaussian σ", mm(polish.sigma, 3)},
                         {"Sampled every", sampling_words(setup)}}};
-  if (options.workshop.polish.rim_depth > 0.0) {
+  if (polish.floor > 0.0) {
+    group.parameters.push_back({"Left of every ripple", percent_text(polish.floor)});
+  }
+  if (polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +
                                      mm(options.workshop.polish.rim_length, 2)});
@@ -455,15 +461,26 @@ std::string process_warning(const CutSetup& setup) {
   const double meant_pitch = number("pitch_mm", pitch);
   const double meant_sigma = number("polish_sigma_mm", sigma);
   const bool other_pitch = std::abs(meant_pitch - pitch) > kSamePitch * meant_pitch;
-  if (!other_pitch && meant_sigma == sigma) return "";
+  // Without these keys a design knows order 2 without a floor.
+  const double meant_order = number("polish_order", kPadOrder);
+  const double meant_floor = number("polish_floor", 0.0);
+  const bool other_kind = meant_order != shop.polish.order || meant_floor != shop.polish.floor;
+  if (!other_pitch && !other_kind && meant_sigma == sigma) return "";
   // A design for a scallop does not know its slopes: designed again, it would assume the same.
   const std::string advice =
       other_pitch && finish.scallop > 0.0
           ? "cut it with --pitch " + trimmed_decimal(meant_pitch / scale, 4) + "mm"
           : "cut it as it was designed, or design it for this workshop (--made-by)";
+  const auto kind = [&](double order, double floor) {
+    return other_kind ? joined({" (order ", trimmed_decimal(order, 0), ", floor ",
+                                trimmed_decimal(floor, 4), ")"})
+                      : std::string();
+  };
   return joined({"the lens was designed for a pitch of ", trimmed_decimal(meant_pitch, 4),
-                 " mm and a polish of σ ", trimmed_decimal(meant_sigma, 4), " mm, not ",
-                 trimmed_decimal(pitch, 4), " and ", trimmed_decimal(sigma, 4), " mm: ", advice});
+                 " mm and a polish of σ ", trimmed_decimal(meant_sigma, 4), " mm",
+                 kind(meant_order, meant_floor), ", not ", trimmed_decimal(pitch, 4), " and ",
+                 trimmed_decimal(sigma, 4), " mm", kind(shop.polish.order, shop.polish.floor), ": ",
+                 advice});
 }
 
 /// Warns of a speed that the controller's setting would silently lower; empty without such a

@@ -17,7 +17,7 @@
 #include "cam/path/outline_cut.h"
 #include "cam/path/rough.h"
 #include "cam/post/program_writer.h"
-#include "cam/report/report_json.h"
+#include "cam/report/report_data.h"
 #include "core/error.h"
 #include "core/io/lens_folder.h"
 #include "core/page/html_page.h"

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "cam/milled/polished_field.h"
 #include "cam/post/program_reader.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
@@ -23,9 +24,9 @@ constexpr double kAboveShortest = 2.0;
 /// the decimals allow lead only to moves of a few micrometres, which turn more.
 constexpr double kGridSlope = 10.0;
 
-/// Width of the apron in σ: the polish's kernel reaches 5, and up to 3 more nodes, which are up to
-/// σ apart, are sampled.
-constexpr double kApronSigmas = 8.0;
+/// Width of the apron in σ beyond the polish's kernel: up to 3 more nodes, which are up to σ apart,
+/// are sampled.
+constexpr double kApronSigmas = 3.0;
 
 RasterPlan finish_raster(const CamOptions& options, const FinishGround& ground, PassAxis along) {
   const FinishProcess& finish = options.workshop.process.finish;
@@ -59,7 +60,9 @@ const Tool* larger_ball(const CamOptions& options) {
 
 double apron_to_cut(const CamOptions& options) {
   const double scale = options.part == PartKind::kMould ? 1.0 / (1.0 - options.shrinkage) : 1.0;
-  return finishing_ball(options).radius() + kApronSigmas * options.workshop.polish.sigma * scale;
+  const PolishModel& polish = options.workshop.polish;
+  return finishing_ball(options).radius() +
+         (kApronSigmas + polish_reach(polish)) * polish.sigma * scale;
 }
 
 int decimals_of(const CamOptions& options) {

@@ -32,7 +32,8 @@ const Tool& finishing_ball(const CamOptions& options);
 const Tool* larger_ball(const CamOptions& options);
 
 /// Width of the continuation that is cut around the surface, mm: the finishing ball's radius and 8
-/// σ of the polish, those of a mould's cast. Nothing beyond has an effect on the light.
+/// σ of the polish, 16 with order 4, those of a mould's cast. Nothing beyond has an effect on the
+/// light.
 double apron_to_cut(const CamOptions& options);
 
 /// Digits after the point in the programs: as chosen, or as many as the tolerances require.

@@ -61,13 +61,13 @@ std::vector<PictureBlur> blurs_of(const OpticalSetup& setup, const CamOptions& o
   std::vector<PictureBlur> blurs = light_blurs(setup, height, wavelength);
   const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
   const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();
-  const double sigma = options.workshop.polish.sigma;
-  blurs.push_back({"polish", kFullWidth * sigma * enlarged / pixel.minCoeff()});
+  const PolishModel& polish = options.workshop.polish;
+  blurs.push_back({"polish", kFullWidth * polish.sigma * enlarged / pixel.minCoeff()});
   constexpr double kPi = std::numbers::pi;
   const double k = 2.0 * kPi / passes.pitch;
   const double amplitude = passes.pitch * passes.pitch /
                            (2.0 * kPi * kPi * finishing_ball(options).radius()) *
-                           std::exp(-0.5 * std::pow(k * sigma, 2));
+                           transfer_of(polish).at(k);
   const double moved = LightPath(setup).reach(2.0 * k * amplitude, height);
   blurs.push_back({"pitch", moved / pixel.minCoeff()});
   return blurs;
@@ -355,8 +355,9 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
       refined(grid, place.cells,
               sample_spacings(options_, optics, passes_on_lens(options_, site_.setup.ground())));
   const std::optional<CastFrame> mould = site_.setup.mould();
-  const double polished = PolishedField::kReach * options_.workshop.polish.sigma +
-                          (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
+  const PolishModel& polish = options_.workshop.polish;
+  const double polished =
+      polish_reach(polish) * polish.sigma + (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   const double beyond = (mould ? mould->scale : 1.0) * polished + passes_.front().tool.diameter;
   const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   const Eigen::AlignedBox2d box =

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -179,5 +180,13 @@ struct ReportData {
     return part == "mould" ? kind + " that is cast" : kind;
   }
 };
+
+/// The report without its pictures, in the fields of report.json (lengths in mm, flux as shares,
+/// infinite values as null): "z_offset", "verdict", "surfaces", "leakage", "places", "tools",
+/// "operations", "setup", "parameters", "warnings", "choices", …
+nlohmann::json report_json(const ReportData& data);
+
+/// One line of the ranking of --compare.
+nlohmann::json choice_json(const ReportChoice& choice);
 
 }  // namespace lensforge

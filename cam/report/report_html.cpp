@@ -9,7 +9,6 @@
 #include <span>
 
 #include "cam/report/report_maps.h"
-#include "cam/report/sections.h"
 #include "cam/report/verdict.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"

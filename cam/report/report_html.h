@@ -22,3 +22,27 @@ std::string_view surface_view_script();
 std::string compare_html(const ReportData& data);
 
 }  // namespace lensforge
+
+/// The report's sections as HTML; each is empty where its data is.
+namespace lensforge::report_section {
+
+std::string header(const ReportData& data);
+std::string pictures(const ReportData& data);
+std::string verdict(const ReportData& data);
+std::string places(const ReportData& data);
+std::string work(const ReportData& data);  ///< Minutes and tools.
+
+std::string warnings(const ReportData& data);
+std::string setup(const ReportData& data);
+std::string light(const ReportData& data);  ///< Lamp, part and screen.
+std::string operations(const ReportData& data);
+std::string certificates(const ReportData& data);
+std::string leakage(const ReportData& data);
+std::string tolerances(const ReportData& data);
+std::string maps(const ReportData& data);
+std::string view(const ReportData& data);
+std::string choices(const ReportData& data);
+std::string parameters(const ReportData& data);
+std::string footer(const ReportData& data);
+
+}  // namespace lensforge::report_section

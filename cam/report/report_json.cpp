@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/report/report_json.h"
-
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <variant>
 
+#include "cam/report/report_data.h"
 #include "cam/report/verdict.h"
 #include "cam/tolerance/part_error.h"
 #include "core/io/lens_folder.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "cam/report/sections.h"
+#include "cam/report/report_html.h"
 #include "core/image/image.h"
 #include "core/page/html_page.h"
 #include "core/page/svg_writer.h"

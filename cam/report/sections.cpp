@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/report/sections.h"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -8,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "cam/report/report_html.h"
 #include "cam/report/report_maps.h"
 #include "cam/tolerance/part_error.h"
 #include "core/optics/front.h"

@@ -9,6 +9,7 @@
 #include "cam/tolerance/part_error.h"
 #include "core/compute/executor.h"
 #include "core/lens/surface_field.h"
+#include "core/optics/polish_transfer.h"
 
 namespace lensforge {
 
@@ -25,14 +26,17 @@ struct BaseAxis {
   }
 };
 
+/// Nodes on every side of a node that its errors depend on. @param order  of the polish.
+inline std::int64_t error_reach(int order) { return order == kFilmOrder ? 2 : 1; }
+
 /// Node spacing as large as the polish allows. Across rows a box is a whole number of pitches wide,
 /// so that scallops vanish from the means and only what rows have in common remains; along them it
 /// is one node spacing wide.
-/// @param size    of the lens, mm. @param sigma  of the polish, mm.
+/// @param size    of the lens, mm.
 /// @param detail  side of the piece of lens that lights a pixel, mm: an eighth of it is always
 ///                resolved along the rows.
-std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& passes, double sigma,
-                                  const Eigen::Vector2d& detail);
+std::array<BaseAxis, 2> base_axes(const Eigen::Vector2d& size, const Passes& passes,
+                                  const PolishTransfer& polish, const Eigen::Vector2d& detail);
 
 /// The surface as cut, before polishing, at the nodes of a grid over the lens and `pad` nodes
 /// beyond its rim: means of its heights over boxes around the nodes (BaseAxis). Nodes beyond the
@@ -80,16 +84,17 @@ class BaseHeights {
 /// - a ball that turns about an axis e beside its own cuts like a ball whose every latitude is e
 ///   wider: −e |s|;
 /// - polish σ (1 + ε) at a place: ½ ((1 + ε)² − 1) σ² Δz, which equals averaging with that σ to
-///   first order.
+///   first order; −¼ ((1 + ε)⁴ − 1) σ⁴ ΔΔz of a film; of either 1 − floor.
 ///
 /// With a crossing raster only the first one's rows are counted.
 class ErrorHeights {
  public:
-  /// @param base  must outlive this. @param sigma  of the polish, this part's mean, mm.
-  ErrorHeights(const BaseHeights& base, const PartError& error, const Passes& passes, double sigma);
+  /// @param base  must outlive this. @param polish  with this part's mean σ.
+  ErrorHeights(const BaseHeights& base, const PartError& error, const Passes& passes,
+               const PolishTransfer& polish);
 
   /// The heights of a rectangle of nodes with errors, row by row.
-  /// @pre one node more on every side lies within the base's padding.
+  /// @pre error_reach() nodes more on every side lie within the base's padding.
   void fill(const CellRange& nodes, double* heights) const;
 
   /// The polish's σ at a node, as a multiple of its mean.
@@ -113,6 +118,8 @@ class ErrorHeights {
   [[nodiscard]] std::size_t touched_place(std::size_t across, const Eigen::Vector2d& slope) const;
   [[nodiscard]] double of_cut(const Eigen::Vector2d& slope, std::size_t along,
                               std::size_t across) const;
+  /// Δz by differences.
+  [[nodiscard]] double bend_at(const double* height) const;
   [[nodiscard]] double of_polish(const double* height, double factor) const;
 
   const BaseHeights& base_;
@@ -121,7 +128,7 @@ class ErrorHeights {
   double radius_;
   double eccentricity_;
   double half_backlash_;
-  double sigma_;
+  PolishTransfer polish_;
   double within_ = 0.0;  ///< ε is this times the sum of the waves.
   Line by_column_;
   Line by_row_;

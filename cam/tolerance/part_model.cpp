@@ -45,7 +45,9 @@ double box_response(const LinePolish& polish, double theta) {
 double response(const LinePolish& polish, double theta) {
   const double in = std::min(theta, kBand);
   const double t = polish.sigma / polish.spacing * in;
-  const double wanted = std::exp(-0.5 * t * t) / box_response(polish, in);
+  const double kept =
+      polish.term == nullptr ? std::exp(-0.5 * t * t) : polish.term->at(t) / polish.term->at(0.0);
+  const double wanted = kept / box_response(polish, in);
   if (theta <= kBand) return wanted;
   const double rest = (std::numbers::pi - theta) / (std::numbers::pi - kBand);
   return wanted * rest * rest;
@@ -75,9 +77,11 @@ Eigen::VectorXd fit(std::int64_t first, std::int64_t reach, const Basis& basis,
 
 }  // namespace
 
-std::int64_t line_filter_reach(double sigma, double spacing) {
+std::int64_t line_filter_reach(double sigma, double spacing, int order) {
   constexpr double kSigmas = 4.2;
-  return static_cast<std::int64_t>(std::ceil(kSigmas * std::max(sigma / spacing, 0.5))) + 3;
+  constexpr double kFilmSigmas = 9.0;
+  const double sigmas = order == kFilmOrder ? kFilmSigmas : kSigmas;
+  return static_cast<std::int64_t>(std::ceil(sigmas * std::max(sigma / spacing, 0.5))) + 3;
 }
 
 /// The innermost significant pair is set so that the sum is 1, or the slope of a straight line its
@@ -114,7 +118,45 @@ LineFilter line_filter(const LinePolish& polish, std::int64_t shift, std::int64_
     straight -= (static_cast<double>(k) + half) * weight;
   }
   filter.slope[static_cast<std::size_t>(inner)] = straight / (away * polish.spacing);
+  if (polish.term == nullptr) return filter;
+  for (double& weight : filter.average) weight *= polish.term->at(0.0);
+  for (double& weight : filter.slope) weight *= polish.term->at(0.0);
   return filter;
+}
+
+namespace {
+
+AxisFilters filters_of(const LinePolish& polish, std::int64_t shifts, int order, double weight) {
+  AxisFilters all{weight, {}};
+  const std::int64_t reach = line_filter_reach(polish.sigma, polish.spacing, order);
+  for (std::int64_t shift = 0; shift < shifts; ++shift) {
+    all.filters.push_back(line_filter(polish, shift, reach));
+  }
+  return all;
+}
+
+}  // namespace
+
+std::vector<AxisFilters> polish_filters(const PolishTransfer& transfer, const LinePolish& polish,
+                                        std::int64_t shifts) {
+  constexpr std::size_t kTerms = 4;  // Exact to 1e-4; the filters are to 2e-3.
+  const double rest = 1.0 - transfer.floor;
+  std::vector<AxisFilters> all;
+  if (transfer.order == kFilmOrder) {
+    for (std::size_t n = 0; n < kTerms; ++n) {
+      LinePolish of_term = polish;
+      of_term.term = &film_terms()[n];
+      all.push_back(filters_of(of_term, shifts, kFilmOrder, rest * of_term.term->sign));
+    }
+  } else {
+    all.push_back(filters_of(polish, shifts, kPadOrder, rest));
+  }
+  if (transfer.floor > 0.0) {
+    LinePolish none = polish;
+    none.sigma = 0.0;
+    all.push_back(filters_of(none, shifts, kPadOrder, transfer.floor));
+  }
+  return all;
 }
 
 namespace {
@@ -161,8 +203,8 @@ std::array<double, kHarmonics> harmonics(const std::array<double, kProfile>& hei
 
 }  // namespace
 
-Ripple::Ripple(const Passes& passes, double radius, double sigma)
-    : pitch_(passes.pitch), radius_(radius), sigma_(sigma), sign_(passes.cast ? -1.0 : 1.0) {
+Ripple::Ripple(const Passes& passes, double radius, const PolishTransfer& polish)
+    : pitch_(passes.pitch), radius_(radius), polish_(polish), sign_(passes.cast ? -1.0 : 1.0) {
   auto height = scallop(passes.pitch, radius);
   if (passes.cross) height = crossed(height);
   const auto coefficients = harmonics(height);
@@ -170,8 +212,7 @@ Ripple::Ripple(const Passes& passes, double radius, double sigma)
     double slope = 0.0;
     for (int k = 1; k <= kHarmonics; ++k) {
       const double wave = kTwoPi * k / passes.pitch;
-      const double kept = std::exp(-0.5 * wave * wave * sigma * sigma);
-      slope -= coefficients[static_cast<std::size_t>(k - 1)] * kept * wave *
+      slope -= coefficients[static_cast<std::size_t>(k - 1)] * polish_.at(wave) * wave *
                std::sin(kTwoPi * k * static_cast<double>(i) / kSlopePlaces);
     }
     slope_.push_back(slope);
@@ -198,7 +239,12 @@ double Ripple::seen_by_disc(double radius) const {
 }
 
 double Ripple::kept(double factor) const {
-  const double t = kTwoPi / pitch_ * sigma_;
+  const double wave = kTwoPi / pitch_;
+  if (polish_.floor > 0.0) return polish_.at(factor * wave) / polish_.at(wave);
+  const double t = wave * polish_.sigma;
+  if (polish_.order == kFilmOrder) {
+    return std::exp(-0.25 * std::pow(t, 4) * (std::pow(factor, 4) - 1.0));
+  }
   return std::exp(-0.5 * t * t * (factor * factor - 1.0));
 }
 
@@ -206,11 +252,14 @@ namespace {
 
 /// Rendering of a part along one axis.
 struct SceneAxis {
-  /// One for every node in a cell of the base: the first, or the first and the middle.
-  std::vector<LineFilter> filters;
-  bool ripples = false;  ///< True if scallops are visible along it.
+  /// The polish's terms, each with one filter for every node in a cell of the base: the first, or
+  /// the first and the middle.
+  std::vector<AxisFilters> terms;
+  bool ripples = false;   ///< True if scallops are visible along it.
+  std::int64_t fine = 1;  ///< Parts between nodes in which a floor's scallops are resolved.
 
-  [[nodiscard]] std::int64_t parts() const { return static_cast<std::int64_t>(filters.size()); }
+  [[nodiscard]] std::int64_t parts() const { return std::ssize(terms.front().filters); }
+  [[nodiscard]] std::int64_t reach() const { return terms.front().filters.front().reach(); }
 };
 
 /// Common inputs of the tiles of one part.
@@ -248,13 +297,19 @@ class PartTile {
   };
 
   [[nodiscard]] Nodes nodes_of(int axis) const;
-  [[nodiscard]] static const LineFilter& filter_of(const SceneAxis& axis, std::int64_t node);
+  [[nodiscard]] static const LineFilter& filter_of(const AxisFilters& filters, std::int64_t node);
   void polish();
-  void polish_line(const double* raw, double* heights, double* slopes) const;
+  void polish_line(std::size_t term, const double* raw, double* heights, double* slopes) const;
+  void add_term(std::size_t term, const std::vector<double>& raw);
   void take_off_rim();
   void land();
   void sharpen();
+  /// Movement of the light per slope of the ripple along an axis.
+  [[nodiscard]] Eigen::Vector2d ripple_step(int axis) const;
   void add_ripple(int axis);
+  void deposit_fine(std::int64_t i, std::int64_t j, const FluxAccumulator& image) const;
+  [[nodiscard]] Eigen::Vector2d fine_landing(std::size_t node, const Eigen::Vector2d& share,
+                                             const Eigen::Vector2d& place) const;
   [[nodiscard]] double seen_by_source(int axis) const;
   [[nodiscard]] Eigen::Vector2d place(std::int64_t i, std::int64_t j) const;
   [[nodiscard]] std::size_t index(std::int64_t i, std::int64_t j) const {
@@ -268,6 +323,7 @@ class PartTile {
   std::vector<double> z_, slope_x_, slope_y_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Eigen::Vector2d> landing_;
+  std::array<Eigen::Vector2d, 2> steps_{};  ///< ripple_step() of axes with fine parts.
 };
 
 /// Between four nodes per period of a ripple (PartModel), linear interpolation leaves sinc²(1/4) of
@@ -282,12 +338,17 @@ std::int64_t cell_of(std::int64_t node, std::int64_t parts) {
   return node >= 0 ? node / parts : -((-node + parts - 1) / parts);
 }
 
-/// out[n] = Σ weight[k] (in[n − k step] + in[n + (k + shift) step]) for n = 0 … count − 1.
-void average(const double* in, std::int64_t step, const LineFilter& filter, std::int64_t count,
-             double* out) {
-  std::fill(out, out + count, 0.0);
+/// out[n] += factor Σ weight[k] (in[n − k step] + in[n + (k + shift) step]) for n = 0 … count − 1.
+struct FilterStep {
+  std::int64_t step = 1;
+  std::int64_t count = 0;
+  double factor = 1.0;
+};
+
+void add_average(const double* in, const FilterStep& run, const LineFilter& filter, double* out) {
+  const auto [step, count, factor] = run;
   for (std::int64_t k = 0; k <= filter.reach(); ++k) {
-    const double weight = filter.average[static_cast<std::size_t>(k)];
+    const double weight = factor * filter.average[static_cast<std::size_t>(k)];
     const double* const before = in - k * step;
     const double* const after = in + (k + filter.shift) * step;
     for (std::int64_t n = 0; n < count; ++n) out[n] += weight * (before[n] + after[n]);
@@ -295,11 +356,10 @@ void average(const double* in, std::int64_t step, const LineFilter& filter, std:
 }
 
 /// The same with the difference of both sides.
-void differentiate(const double* in, std::int64_t step, const LineFilter& filter,
-                   std::int64_t count, double* out) {
-  std::fill(out, out + count, 0.0);
+void add_slope(const double* in, const FilterStep& run, const LineFilter& filter, double* out) {
+  const auto [step, count, factor] = run;
   for (std::int64_t k = 0; k <= filter.reach(); ++k) {
-    const double weight = filter.slope[static_cast<std::size_t>(k)];
+    const double weight = factor * filter.slope[static_cast<std::size_t>(k)];
     const double* const before = in - k * step;
     const double* const after = in + (k + filter.shift) * step;
     for (std::int64_t n = 0; n < count; ++n) out[n] += weight * (after[n] - before[n]);
@@ -313,7 +373,14 @@ PartTile::PartTile(const PartScene& scene, const CellRange& cells)
   land();
   sharpen();
   for (int axis = 0; axis < 2; ++axis) {
-    if (scene_.axes[static_cast<std::size_t>(axis)].ripples) add_ripple(axis);
+    const SceneAxis& scene_axis = scene_.axes[static_cast<std::size_t>(axis)];
+    Eigen::Vector2d& step = steps_[static_cast<std::size_t>(axis)];
+    step.setZero();
+    if (scene_axis.ripples && scene_axis.fine > 1) {
+      step = ripple_step(axis);
+    } else if (scene_axis.ripples) {
+      add_ripple(axis);
+    }
   }
 }
 
@@ -321,7 +388,7 @@ PartTile::Nodes PartTile::nodes_of(int axis) const {
   const SceneAxis& scene = scene_.axes[static_cast<std::size_t>(axis)];
   const std::int64_t from = axis == 0 ? cells_.column : cells_.row;
   const std::int64_t cells = axis == 0 ? cells_.columns : cells_.rows;
-  const std::int64_t reach = scene.filters.front().reach();
+  const std::int64_t reach = scene.reach();
   Nodes nodes{};
   nodes.parts = scene.parts();
   nodes.first = nodes.parts * from - 1;
@@ -329,30 +396,32 @@ PartTile::Nodes PartTile::nodes_of(int axis) const {
   nodes.base = cell_of(nodes.first, nodes.parts) - reach;
   // Behind the last node's cell there is one more base where filters lie between nodes.
   const std::int64_t last =
-      cell_of(nodes.first + nodes.count - 1, nodes.parts) + scene.filters.back().shift + reach;
+      cell_of(nodes.first + nodes.count - 1, nodes.parts) + scene.parts() - 1 + reach;
   nodes.bases = last - nodes.base + 1;
   nodes.spacing = scene_.base.axis(axis).spacing / static_cast<double>(nodes.parts);
   return nodes;
 }
 
-const LineFilter& PartTile::filter_of(const SceneAxis& axis, std::int64_t node) {
-  const std::int64_t part = node - axis.parts() * cell_of(node, axis.parts());
-  return axis.filters[static_cast<std::size_t>(part)];
+const LineFilter& PartTile::filter_of(const AxisFilters& filters, std::int64_t node) {
+  const std::int64_t parts = std::ssize(filters.filters);
+  return filters.filters[static_cast<std::size_t>(node - parts * cell_of(node, parts))];
 }
 
 /// Polishes one row of the base along x. Nodes at the same position in their cells are stored
 /// together first.
-void PartTile::polish_line(const double* raw, double* heights, double* slopes) const {
+void PartTile::polish_line(std::size_t term, const double* raw, double* heights,
+                           double* slopes) const {
   std::vector<double> line(static_cast<std::size_t>(2 * x_.bases));
   for (std::int64_t first = 0; first < x_.parts; ++first) {
     const std::int64_t node = x_.first + first;
-    const LineFilter& filter = filter_of(scene_.axes[0], node);
+    const LineFilter& filter = filter_of(scene_.axes[0].terms[term], node);
     const double* const in = raw + cell_of(node, x_.parts) - x_.base;
     const std::int64_t count = (x_.count - first + x_.parts - 1) / x_.parts;
     double* const means = line.data();
     double* const rises = means + x_.bases;
-    average(in, 1, filter, count, means);
-    differentiate(in, 1, filter, count, rises);
+    std::fill(line.begin(), line.end(), 0.0);
+    add_average(in, {1, count}, filter, means);
+    add_slope(in, {1, count}, filter, rises);
     for (std::int64_t n = 0; n < count; ++n) {
       heights[first + n * x_.parts] = means[n];
       slopes[first + n * x_.parts] = rises[n];
@@ -363,22 +432,28 @@ void PartTile::polish_line(const double* raw, double* heights, double* slopes) c
 void PartTile::polish() {
   std::vector<double> raw(static_cast<std::size_t>(x_.bases * y_.bases));
   scene_.heights.fill({x_.base, y_.base, x_.bases, y_.bases}, raw.data());
+  const auto nodes = static_cast<std::size_t>(x_.count * y_.count);
+  z_.assign(nodes, 0.0);
+  slope_x_.assign(nodes, 0.0);
+  slope_y_.assign(nodes, 0.0);
+  for (std::size_t term = 0; term < scene_.axes[0].terms.size(); ++term) add_term(term, raw);
+}
+
+void PartTile::add_term(std::size_t term, const std::vector<double>& raw) {
   std::vector<double> heights(static_cast<std::size_t>(x_.count * y_.bases));
   std::vector<double> slopes(heights.size());
   for (std::int64_t j = 0; j < y_.bases; ++j) {
-    polish_line(&raw[static_cast<std::size_t>(j * x_.bases)], &heights[index(0, j)],
+    polish_line(term, &raw[static_cast<std::size_t>(j * x_.bases)], &heights[index(0, j)],
                 &slopes[index(0, j)]);
   }
-  const auto nodes = static_cast<std::size_t>(x_.count * y_.count);
-  z_.resize(nodes);
-  slope_x_.resize(nodes);
-  slope_y_.resize(nodes);
+  const AxisFilters& filters = scene_.axes[1].terms[term];
+  const FilterStep run{x_.count, x_.count, filters.weight};
   for (std::int64_t j = 0; j < y_.count; ++j) {
-    const LineFilter& filter = filter_of(scene_.axes[1], y_.first + j);
+    const LineFilter& filter = filter_of(filters, y_.first + j);
     const std::size_t from = index(0, cell_of(y_.first + j, y_.parts) - y_.base);
-    average(&heights[from], x_.count, filter, x_.count, &z_[index(0, j)]);
-    average(&slopes[from], x_.count, filter, x_.count, &slope_x_[index(0, j)]);
-    differentiate(&heights[from], x_.count, filter, x_.count, &slope_y_[index(0, j)]);
+    add_average(&heights[from], run, filter, &z_[index(0, j)]);
+    add_average(&slopes[from], run, filter, &slope_x_[index(0, j)]);
+    add_slope(&heights[from], run, filter, &slope_y_[index(0, j)]);
   }
 }
 
@@ -430,15 +505,18 @@ void PartTile::sharpen() {
 
 /// The ripple's polish and the light's movement per slope hardly change over a tile: both are taken
 /// in its middle.
-void PartTile::add_ripple(int axis) {
+Eigen::Vector2d PartTile::ripple_step(int axis) const {
   const std::size_t middle = index(x_.count / 2, y_.count / 2);
   const Eigen::Vector2d moved =
       scene_.light.moved_by(points_[middle], {slope_x_[middle], slope_y_[middle]}, axis);
-  if (!moved.allFinite()) return;
+  if (!moved.allFinite()) return Eigen::Vector2d::Zero();
   const double factor =
       scene_.heights.sigma_factor(cells_.column + cells_.columns / 2, cells_.row + cells_.rows / 2);
-  const Eigen::Vector2d step =
-      kRippleGain * scene_.ripple.kept(factor) * seen_by_source(axis) * moved;
+  return scene_.ripple.kept(factor) * seen_by_source(axis) * moved;
+}
+
+void PartTile::add_ripple(int axis) {
+  const Eigen::Vector2d step = kRippleGain * ripple_step(axis);
   for (std::int64_t j = 0; j < y_.count; ++j) {
     for (std::int64_t i = 0; i < x_.count; ++i) {
       const std::size_t n = index(i, j);
@@ -464,10 +542,61 @@ double PartTile::flux_of(std::size_t a, std::size_t b, std::size_t c) const {
   return scene_.light.intake({points_[a], points_[b], points_[c]}) / scene_.whole;
 }
 
+/// Where light lands between nodes.
+/// @param node  at the cell's low corner. @param share  of the cell from there.
+Eigen::Vector2d PartTile::fine_landing(std::size_t node, const Eigen::Vector2d& share,
+                                       const Eigen::Vector2d& place) const {
+  const auto up = static_cast<std::size_t>(x_.count);
+  const auto between = [&](const auto& of) {
+    return ((1.0 - share.y()) * ((1.0 - share.x()) * of(node) + share.x() * of(node + 1)) +
+            share.y() * ((1.0 - share.x()) * of(node + up) + share.x() * of(node + up + 1)))
+        .eval();
+  };
+  Eigen::Vector2d landing = between([&](std::size_t n) { return landing_[n]; });
+  const Eigen::Vector2d slope =
+      between([&](std::size_t n) { return Eigen::Vector2d(slope_x_[n], slope_y_[n]); });
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector2d& step = steps_[static_cast<std::size_t>(axis)];
+    if (!step.isZero()) landing += scene_.ripple.slope(place[axis], slope, axis) * step;
+  }
+  return landing;
+}
+
+/// Deposits a cell in parts of equal light.
+void PartTile::deposit_fine(std::int64_t i, std::int64_t j, const FluxAccumulator& image) const {
+  const std::array<std::int64_t, 2> parts{scene_.axes[0].fine, scene_.axes[1].fine};
+  const Eigen::Vector2d part(1.0 / static_cast<double>(parts[0]),
+                             1.0 / static_cast<double>(parts[1]));
+  const Eigen::Vector2d spacing(x_.spacing, y_.spacing);
+  const std::size_t node = index(i, j);
+  const auto at = [&](std::int64_t s, std::int64_t t) {
+    const Eigen::Vector2d share =
+        part.cwiseProduct(Eigen::Vector2d(static_cast<double>(s), static_cast<double>(t)));
+    return fine_landing(node, share, place(i, j) + share.cwiseProduct(spacing));
+  };
+  const std::size_t opposite = index(i + 1, j + 1);
+  const double flux =
+      0.5 * part.prod() *
+      (flux_of(node, node + 1, opposite) + flux_of(node, opposite, index(i, j + 1)));
+  for (std::int64_t t = 0; t < parts[1]; ++t) {
+    for (std::int64_t s = 0; s < parts[0]; ++s) {
+      const Eigen::Vector2d low = at(s, t);
+      const Eigen::Vector2d high = at(s + 1, t + 1);
+      lensforge::deposit({low, at(s + 1, t), high, flux}, image);
+      lensforge::deposit({low, high, at(s, t + 1), flux}, image);
+    }
+  }
+}
+
 void PartTile::deposit(const FluxAccumulator& image) const {
+  const bool fine = scene_.axes[0].fine * scene_.axes[1].fine > 1;
   const auto up = static_cast<std::size_t>(x_.count);
   for (std::int64_t j = 1; j + 2 < y_.count; ++j) {
     for (std::int64_t i = 1; i + 2 < x_.count; ++i) {
+      if (fine) {
+        deposit_fine(i, j, image);
+        continue;
+      }
       const std::size_t a = index(i, j);
       const std::size_t c = a + up + 1;
       lensforge::deposit({landing_[a], landing_[a + 1], landing_[c], flux_of(a, a + 1, c)}, image);
@@ -483,15 +612,15 @@ constexpr std::int64_t kTile = 96;
 std::array<BaseAxis, 2> axes_of(const PartPlan& plan) {
   const Eigen::Vector2d& size = plan.optics.lens_size;
   const Eigen::Vector2d detail = size.cwiseQuotient(plan.optics.pixels.cast<double>());
-  return base_axes(size, plan.passes, plan.polish.sigma, detail);
+  return base_axes(size, plan.passes, transfer_of(plan.polish), detail);
 }
 
 /// Nodes beyond the rim needed by the filters of the strongest polish, one more for the slopes
 /// there that errors need, and one for the landing places beside the rim's.
-std::int64_t pad_of(const std::array<BaseAxis, 2>& axes, double sigma) {
-  return std::max(line_filter_reach(sigma, axes[0].spacing),
-                  line_filter_reach(sigma, axes[1].spacing)) +
-         2;
+std::int64_t pad_of(const std::array<BaseAxis, 2>& axes, double sigma, int order) {
+  return std::max(line_filter_reach(sigma, axes[0].spacing, order),
+                  line_filter_reach(sigma, axes[1].spacing, order)) +
+         1 + error_reach(order);
 }
 
 double mean_height(const BaseHeights& base) {
@@ -526,15 +655,17 @@ PartNodes light_nodes(const BaseHeights& base) {
 }
 
 /// Across rows with a ripple there are four nodes per pitch.
-SceneAxis scene_axis(const BaseAxis& axis, double sigma, bool ripples) {
-  SceneAxis scene;
-  scene.ripples = ripples;
-  const LinePolish polish{sigma, axis.spacing, axis.box(), 2 * axis.half};
-  const std::int64_t reach = line_filter_reach(sigma, axis.spacing);
-  for (std::int64_t shift = 0; shift <= (ripples ? 1 : 0); ++shift) {
-    scene.filters.push_back(line_filter(polish, shift, reach));
-  }
-  return scene;
+SceneAxis scene_axis(const BaseAxis& axis, const PolishTransfer& transfer, bool ripples) {
+  const LinePolish polish{transfer.sigma, axis.spacing, axis.box(), 2 * axis.half};
+  return {polish_filters(transfer, polish, ripples ? 2 : 1), ripples};
+}
+
+/// What a floor leaves of scallops is no sine that four nodes per pitch could carry: the space
+/// between nodes is divided.
+std::int64_t fine_parts(const SceneAxis& axis, const BaseAxis& base, double pitch) {
+  constexpr double kPerPitch = 24.0;  // As cam_options.cpp samples such a part.
+  const double spacing = base.spacing / static_cast<double>(axis.parts());
+  return std::max<std::int64_t>(1, std::llround(kPerPitch * spacing / pitch));
 }
 
 /// Where boxes hold several pitches, these are so much finer than σ that no ripple is left: less
@@ -592,19 +723,25 @@ PartModel::PartModel(const SurfaceField& cut, const PartPlan& plan, const Execut
                      const RunControl& control)
     : plan_(plan),
       base_(BaseHeights::sample(cut, plan.apron, axes_of(plan),
-                                pad_of(axes_of(plan), plan.largest_sigma), executor, control)),
+                                pad_of(axes_of(plan), plan.largest_sigma, plan.polish.order),
+                                executor, control)),
       mean_height_(mean_height(base_)),
       lit_(light_nodes(base_)) {}
 
 FluxPicture PartModel::render(const PartError& error, const Executor& executor) const {
   const Passes& passes = plan_.passes;
   const double sigma = std::min(plan_.polish.sigma * error.sigma_factor, plan_.largest_sigma);
+  const PolishTransfer polish{sigma, plan_.polish.order, plan_.polish.floor};
   const PartLight light(plan_.optics, error);
-  const ErrorHeights heights(base_, error, passes, sigma);
-  const Ripple ripple(passes, passes.ball_radius + error.radius, sigma);
+  const ErrorHeights heights(base_, error, passes, polish);
+  const Ripple ripple(passes, passes.ball_radius + error.radius, polish);
   const auto axis = [&](int k) {
     const bool across = k != passes.axis || passes.cross;
-    return scene_axis(base_.axis(k), sigma, across && ripples(base_.axis(k), passes));
+    const bool floor = polish.floor > 0.0;
+    SceneAxis scene =
+        scene_axis(base_.axis(k), polish, across && (floor || ripples(base_.axis(k), passes)));
+    if (across && floor) scene.fine = fine_parts(scene, base_.axis(k), passes.pitch);
+    return scene;
   };
   PartScene scene{base_,
                   heights,

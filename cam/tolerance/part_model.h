@@ -14,6 +14,7 @@
 #include "core/compute/executor.h"
 #include "core/lens/surface_field.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/polish_transfer.h"
 
 namespace lensforge {
 
@@ -30,29 +31,42 @@ struct LineFilter {
 
 /// Remaining polish of heights that are means over boxes around the nodes.
 struct LinePolish {
-  double sigma = 0.0;        ///< Of the Gaussian, mm, ≥ 0.
-  double spacing = 0.0;      ///< Of the nodes, mm, > 0.
-  double box = 0.0;          ///< Width of the boxes, mm, 0 … 2 spacings.
-  std::int64_t samples = 1;  ///< Samples averaged by each box, evenly spaced.
+  double sigma = 0.0;              ///< Of the Gaussian, mm, ≥ 0.
+  double spacing = 0.0;            ///< Of the nodes, mm, > 0.
+  double box = 0.0;                ///< Width of the boxes, mm, 0 … 2 spacings.
+  std::int64_t samples = 1;        ///< Samples averaged by each box, evenly spaced.
+  const LineTerm* term = nullptr;  ///< In place of the Gaussian, with wave numbers times σ; if any.
 };
 
 /// The filter that turns means over boxes into the polished heights and their slopes: the
 /// least-squares approximation, with `reach` nodes to either side, of exp(−σ²k²/2) / B(k) over the
 /// frequencies that the nodes can carry, where B(k) is the box's own response. Straight lines are
-/// preserved. The LineFilter.* tests bound the error: 0.2 % for waves of five nodes and more.
-/// @param shift  0 or 1. @pre reach ≥ 2, and ≥ 4.2 σ / spacing for that error.
+/// preserved; with a term in place of the Gaussian the term's share of them. The LineFilter.* tests
+/// bound the error: 0.2 % for waves of five nodes and more.
+/// @param shift  0 or 1. @pre reach ≥ 2, and line_filter_reach() for that error.
 LineFilter line_filter(const LinePolish& polish, std::int64_t shift, std::int64_t reach);
 
-/// The reach that line_filter() needs.
-std::int64_t line_filter_reach(double sigma, double spacing);
+/// The reach that line_filter() needs. @param order  of the polish's transfer function.
+std::int64_t line_filter_reach(double sigma, double spacing, int order = kPadOrder);
+
+/// Filters along one axis.
+struct AxisFilters {
+  double weight = 1.0;              ///< Of their product with those along the other axis.
+  std::vector<LineFilter> filters;  ///< One for each shift.
+};
+
+/// The filters of a polish, whose products along x and y sum up to it: one, or four terms of a
+/// film, and one for a floor. @param polish  without a term. @param shifts  1 or 2.
+std::vector<AxisFilters> polish_filters(const PolishTransfer& transfer, const LinePolish& polish,
+                                        std::int64_t shifts);
 
 /// The slopes across the rows that remain of a raster's scallops after polishing: over a period p,
-/// the k-th harmonic of the ball's profile keeps exp(−2π²k²σ²/p²) of its height. For crossing rows
-/// it uses the mean of what the second raster leaves of each scallop.
+/// the k-th harmonic of the ball's profile keeps T(2πk/p) of its height (PolishTransfer). For
+/// crossing rows it uses the mean of what the second raster leaves of each scallop.
 class Ripple {
  public:
-  /// @param radius  of the actual ball, mm. @param sigma  of the polish, mm.
-  Ripple(const Passes& passes, double radius, double sigma);
+  /// @param radius  of the actual ball, mm.
+  Ripple(const Passes& passes, double radius, const PolishTransfer& polish);
 
   /// Slope (rise over run) at a place across the rows, mm, on a surface of this slope. A ball over
   /// row y touches the surface at y + R s / √(1 + |s|²), where its scallops are lowest; the ball's
@@ -74,7 +88,7 @@ class Ripple {
  private:
   double pitch_;
   double radius_;
-  double sigma_;
+  PolishTransfer polish_;
   double sign_;  ///< −1 in a mould, where rows leave ridges.
   double largest_ = 0.0;
   std::vector<double> slope_;  ///< At equal parts of a period, starting at the lowest place.

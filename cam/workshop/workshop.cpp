@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/optics/polish_transfer.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -231,6 +232,9 @@ void validate(const Workshop& workshop, const std::string& file) {
   for (std::size_t i = 0; i < workshop.tools.size(); ++i) check_tool(rules, workshop, i);
   check_keep_outs(rules, workshop);
   check_process(rules, workshop);
+  const int order = workshop.polish.order;
+  rules.hold(order == kPadOrder || order == kFilmOrder, "polish.order", order,
+             "must be 2 (pads and wheels) or 4 (a levelling film)");
 }
 
 }  // namespace lensforge

@@ -119,9 +119,11 @@ double max_pitch(const FinishProcess& process, double ball_radius, double steepe
 
 /// Model of polishing; all lengths in mm.
 struct PolishModel {
-  double sigma = 0.0;       ///< Of the Gaussian that averages the heights, ≥ 0; 0: not polished.
+  double sigma = 0.0;       ///< Of the transfer function, ≥ 0; 0: not polished.
   double rim_depth = 0.0;   ///< Additional removal at the rim, ≥ 0.
   double rim_length = 1.0;  ///< Distance over which that falls to 1/e, > 0.
+  int order = 2;            ///< Of the transfer function (PolishTransfer): 2 or 4.
+  double floor = 0.0;       ///< Share of every ripple that stays, in [0, 1).
 
   friend bool operator==(const PolishModel&, const PolishModel&) = default;
 };

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "cam/workshop/workshop.h"
+#include "core/optics/polish_transfer.h"
 #include "core/schema/toml.h"
 
 namespace lensforge {
@@ -31,6 +32,9 @@ constexpr double kMaxPitchError = 0.02;
 
 /// σ and depth at the rim, mm; beyond it no picture is left.
 constexpr double kMaxPolish = 1.0;
+
+/// Share of a ripple that stays; with more there is hardly a polish.
+constexpr double kMaxFloor = 0.99;
 
 /// mm; shorter waves are finer than the rows.
 constexpr double kShortestWave = 0.2;
@@ -107,7 +111,7 @@ void describe(Description& d, Material& material) {
 void describe(Description& d, Stock& stock) {
   d.length("margin", stock.margin, {0.0, kBlank},
            "mm beyond the lens's rectangle on every side, at least a finishing ball's radius and 8 "
-           "sigma");
+           "sigma, 16 where polish.order is 4");
   d.length("allowance", stock.allowance, {0.0, kBlank}, "mm above the surface's highest point");
 }
 
@@ -184,7 +188,13 @@ void describe(Description& d, Process& process) {
 
 void describe(Description& d, PolishModel& polish) {
   d.length("sigma", polish.sigma, {0.0, kMaxPolish},
-           "mm, of the Gaussian that heights are averaged with; 0: not polished");
+           "mm; of a ripple of wave number k floor + (1 - floor) exp(-(sigma k / sqrt 2)^order) "
+           "stays; 0: not polished");
+  d.whole("order", polish.order, {kPadOrder, kFilmOrder},
+          "2: pads and wheels, an average with a Gaussian of sigma; 4: a levelling film, flame and "
+          "vapour");
+  d.number("floor", polish.floor, {0.0, kMaxFloor}, "",
+           "share of every ripple that stays, as pads bridge valleys");
   d.length("rim_depth", polish.rim_depth, {0.0, kMaxPolish}, "mm taken off in addition at the rim");
   d.length("rim_length", polish.rim_length, {1e-3, 1000.0},
            "mm from the rim over which that falls to a third");

@@ -99,6 +99,9 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
     description.push_back(
         {made.pitch, made.rows_along_x, made.polish_sigma, made.rim_depth, made.rim_length});
     if (made.polish_spread > 0.0) description.push_back(made.polish_spread);
+    if (made.polish_order != 2 || made.polish_floor > 0.0) {
+      description.push_back({made.polish_order, made.polish_floor});
+    }
   }
   Fnv1a hash;
   hash.add(description.dump());

@@ -11,16 +11,18 @@ namespace lensforge {
 /// MadeNodes would take ten times as long.
 inline constexpr double kFineKnotCell = 3.0;
 
-/// The process that a design is made for, lengths in mm: rows of a ball-end mill, then an average
-/// with a Gaussian, as in PolishedField.
+/// The process that a design is made for, lengths in mm: rows of a ball-end mill, then the polish
+/// of PolishedField.
 struct MadeBy {
   double pitch = 0.06;         ///< Distance between neighbouring rows, > 0.
   bool rows_along_x = true;    ///< Else along y.
-  double polish_sigma = 0.03;  ///< σ of the Gaussian, > 0.
+  double polish_sigma = 0.03;  ///< PolishTransfer::sigma, > 0.
   double rim_depth = 0.0;      ///< Additional depth polished off at the rim, ≥ 0.
   double rim_length = 1.0;     ///< Distance over which rim_depth falls to 1/e, > 0.
   /// Relative standard deviation of polish_sigma from part to part, in [0, 1).
   double polish_spread = 0.0;
+  int polish_order = 2;       ///< PolishTransfer::order
+  double polish_floor = 0.0;  ///< PolishTransfer::floor
 
   /// The same process for a part that is cast in a mould cut this way and then polished: the mould
   /// is 1 / (1 − shrinkage) as large.

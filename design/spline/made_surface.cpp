@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/lens/continued_surface.h"
+#include "core/optics/polish_transfer.h"
 #include "core/spline/cubic_spline.h"
 
 namespace lensforge {
@@ -69,15 +70,16 @@ AveragingGrid::AveragingGrid(const Eigen::Vector2d& lens_size, const MadeBy& mad
   const Eigen::Array2d wanted = size_.array() / (kSpacing * sigma_.array());
   cells_ = wanted.ceil().cast<int>().max(kReach);
   step_ = size_.array() / cells_.cast<double>().array();
+  if (made.polish_order == kFilmOrder) lay_filter(made.polish_sigma);
   lines_ = {make_lines(0), make_lines(1)};
 }
 
 /// In make_heights() the samples next to the rim, from it inwards, are behind all others.
 std::vector<AveragingGrid::Line> AveragingGrid::make_lines(int axis) const {
   const double step = step_[axis];
-  const Eigen::Index beside = cells_[axis] + 1 + 2 * kReach;
+  const Eigen::Index beside = cells_[axis] + 1 + 2 * margin_[axis];
   std::vector<Line> lines;
-  for (int i = 0; i <= cells_[axis]; ++i) lines.push_back({i * step, i + kReach});
+  for (int i = 0; i <= cells_[axis]; ++i) lines.push_back({i * step, i + margin_[axis]});
   for (int k = 0; k < kBesideRim; ++k) {
     const double apart = (k + 1) * kRimSpacing * step;
     lines.push_back({apart, beside + k});
@@ -88,9 +90,32 @@ std::vector<AveragingGrid::Line> AveragingGrid::make_lines(int axis) const {
   return lines;
 }
 
+/// The terms' weights, made exact for constants.
+void AveragingGrid::lay_filter(double sigma) {
+  double mean = 0.0;
+  for (const LineTerm& term : film_over_gaussian_terms()) {
+    FilterTerm& weights = filter_.emplace_back();
+    Eigen::Vector2d means(0.0, 0.0);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double step = step_[static_cast<Eigen::Index>(axis)] / sigma;
+      const int reach = static_cast<int>(std::ceil(kFilmReach / step));
+      margin_[static_cast<Eigen::Index>(axis)] = kReach + reach;
+      for (int k = 0; k <= reach; ++k) {
+        weights[axis].push_back(step * term.kernel(k * step, 0));
+        means[static_cast<Eigen::Index>(axis)] += (k == 0 ? 1.0 : 2.0) * weights[axis].back();
+      }
+    }
+    for (double& weight : weights[1]) weight *= term.sign;
+    mean += term.sign * means.prod();
+  }
+  for (FilterTerm& weights : filter_) {
+    for (double& weight : weights[1]) weight /= mean;
+  }
+}
+
 Eigen::MatrixXd AveragingGrid::make_heights() const {
-  constexpr int kMore = 1 + 2 * (kReach + kBesideRim);
-  return Eigen::MatrixXd::Zero(cells_.x() + kMore, cells_.y() + kMore);
+  const Eigen::Vector2i size = samples().array() + 2 * kBesideRim;
+  return Eigen::MatrixXd::Zero(size.x(), size.y());
 }
 
 /// f(−t) = f − t f′ + height(t) f″ with one-sided differences.
@@ -99,10 +124,10 @@ AveragingGrid::RimWeights AveragingGrid::rim_weights(int axis) const {
   const Eigen::Vector4d bend(2.0, -5.0, 4.0, -1.0);
   const double apart = kRimSpacing * step_[axis];
   RimWeights weights;
-  for (int k = 1; k <= kReach; ++k) {
+  for (int k = 1; k <= margin_[axis]; ++k) {
     const double beyond = k * step_[axis];
-    weights[static_cast<std::size_t>(k - 1)] = Eigen::Vector4d::Unit(0) - beyond / apart * slope +
-                                               RunOut{}.height(beyond) / (apart * apart) * bend;
+    weights.emplace_back(Eigen::Vector4d::Unit(0) - beyond / apart * slope +
+                         RunOut{}.height(beyond) / (apart * apart) * bend);
   }
   return weights;
 }
@@ -113,12 +138,13 @@ namespace {
 /// of an axis and of those that make it up. @param lines  all of the axis.
 template <class Weights, class Take>
 void for_each_beyond(Eigen::Index lines, const Weights& weights, const Take& take) {
+  const auto beyond = std::ssize(weights);
   const Eigen::Index beside = lines - 2 * kBesideRim;
-  const Eigen::Index last = beside - 1 - kReach;
-  for (Eigen::Index k = 1; k <= kReach; ++k) {
+  const Eigen::Index last = beside - 1 - beyond;
+  for (Eigen::Index k = 1; k <= beyond; ++k) {
     const Eigen::Vector4d& w = weights[static_cast<std::size_t>(k - 1)];
     for (Eigen::Index j = 0; j < w.size(); ++j) {
-      take(kReach - k, j == 0 ? kReach : beside + j - 1, w[j]);
+      take(beyond - k, j == 0 ? beyond : beside + j - 1, w[j]);
       take(last + k, j == 0 ? last : beside + kBesideRim + j - 1, w[j]);
     }
   }
@@ -127,14 +153,14 @@ void for_each_beyond(Eigen::Index lines, const Weights& weights, const Take& tak
 }  // namespace
 
 void AveragingGrid::continue_beyond_rim(Eigen::MatrixXd& heights) const {
-  heights.topRows(kReach).setZero();
-  heights.middleRows(kReach + cells_.x() + 1, kReach).setZero();
+  heights.topRows(margin_.x()).setZero();
+  heights.middleRows(margin_.x() + cells_.x() + 1, margin_.x()).setZero();
   for_each_beyond(heights.rows(), rim_weights(0),
                   [&](Eigen::Index to, Eigen::Index from, double w) {
                     heights.row(to) += w * heights.row(from);
                   });
-  heights.leftCols(kReach).setZero();
-  heights.middleCols(kReach + cells_.y() + 1, kReach).setZero();
+  heights.leftCols(margin_.y()).setZero();
+  heights.middleCols(margin_.y() + cells_.y() + 1, margin_.y()).setZero();
   for_each_beyond(heights.cols(), rim_weights(1),
                   [&](Eigen::Index to, Eigen::Index from, double w) {
                     heights.col(to) += w * heights.col(from);
@@ -150,6 +176,54 @@ void AveragingGrid::continue_beyond_rim_adjoint(Eigen::MatrixXd& heights_bar) co
                   [&](Eigen::Index to, Eigen::Index from, double w) {
                     heights_bar.row(from) += w * heights_bar.row(to);
                   });
+}
+
+/// The sum of the filter's terms where they have all their samples.
+Eigen::MatrixXd AveragingGrid::convolved(const Eigen::MatrixXd& samples,
+                                         const Executor& executor) const {
+  const Eigen::Vector2i reach = margin_.array() - kReach;
+  const Eigen::Index rows = samples.rows() - 2 * reach.x();
+  const Eigen::Index columns = samples.cols() - 2 * reach.y();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(rows, columns);
+  Eigen::MatrixXd along_x(rows, samples.cols());
+  for (const FilterTerm& term : filter_) {
+    const auto filter_x = [&](std::int64_t j) {
+      const auto from = [&](Eigen::Index k) { return samples.col(j).segment(reach.x() + k, rows); };
+      along_x.col(j) = term[0][0] * from(0);
+      for (Eigen::Index k = 1; k <= reach.x(); ++k) {
+        along_x.col(j) += term[0][static_cast<std::size_t>(k)] * (from(-k) + from(k));
+      }
+    };
+    parallel_for(executor, "filter heights along x", samples.cols(), filter_x, 16);
+    const auto filter_y = [&](std::int64_t j) {
+      const auto from = [&](Eigen::Index k) { return along_x.col(j + reach.y() + k); };
+      sum.col(j) += term[1][0] * from(0);
+      for (Eigen::Index k = 1; k <= reach.y(); ++k) {
+        sum.col(j) += term[1][static_cast<std::size_t>(k)] * (from(-k) + from(k));
+      }
+    };
+    parallel_for(executor, "filter heights along y", columns, filter_y, 16);
+  }
+  return sum;
+}
+
+Eigen::MatrixXd AveragingGrid::filtered(const Eigen::MatrixXd& heights,
+                                        const Executor& executor) const {
+  if (filter_.empty()) return heights;
+  return convolved(heights.topLeftCorner(samples().x(), samples().y()), executor);
+}
+
+/// The weights are even: the adjoint is the same filter, over zeros around the samples.
+Eigen::MatrixXd AveragingGrid::filtered_adjoint(const Eigen::MatrixXd& filtered_bar,
+                                                const Executor& executor) const {
+  if (filter_.empty()) return filtered_bar;
+  const Eigen::Vector2i around = 2 * (margin_.array() - kReach);
+  Eigen::MatrixXd padded = Eigen::MatrixXd::Zero(filtered_bar.rows() + 2 * around.x(),
+                                                 filtered_bar.cols() + 2 * around.y());
+  padded.block(around.x(), around.y(), filtered_bar.rows(), filtered_bar.cols()) = filtered_bar;
+  Eigen::MatrixXd heights_bar = make_heights();
+  heights_bar.topLeftCorner(samples().x(), samples().y()) = convolved(padded, executor);
+  return heights_bar;
 }
 
 int AveragingGrid::first_sample(double at, int axis) const {
@@ -188,7 +262,9 @@ Eigen::Matrix2d plan_of(const SplineFrame& frame) {
 }  // namespace
 
 MadeSurface::MadeSurface(const ControlNet& net, const MadeBy& made, const Executor& executor)
-    : grid_({net.points.row(0).maxCoeff(), net.points.row(1).maxCoeff()}, made),
+    : floor_(made.polish_floor),
+      net_(floor_ > 0.0 ? net : ControlNet{}),
+      grid_({net.points.row(0).maxCoeff(), net.points.row(1).maxCoeff()}, made),
       heights_(grid_.make_heights()) {
   const std::vector<AveragingGrid::Line>& rows = grid_.lines(1);
   const auto sample = [&](std::int64_t row) {
@@ -196,6 +272,7 @@ MadeSurface::MadeSurface(const ControlNet& net, const MadeBy& made, const Execut
   };
   parallel_for(executor, "heights to polish", static_cast<std::int64_t>(rows.size()), sample, 1);
   grid_.continue_beyond_rim(heights_);
+  heights_ = grid_.filtered(heights_, executor);
 }
 
 /// Newton's method from the last sample, and a Taylor expansion over its remaining error.
@@ -235,6 +312,13 @@ SurfacePoint MadeSurface::at(const Eigen::Vector2d& xy) const {
     }
     made.z += y.value[n] * value;
     made.slope += Eigen::Vector2d(y.value[n] * slope, y.slope[n] * value);
+  }
+  if (floor_ > 0.0) {
+    const Eigen::Vector2d cells = net_.cells().cast<double>();
+    const Eigen::Vector2d start = xy.cwiseQuotient(grid_.size()).cwiseProduct(cells);
+    const SurfaceShape own = net_.at(net_.parameters_of(xy, start)).shape();
+    made.z = floor_ * own.z + (1.0 - floor_) * made.z;
+    made.slope = floor_ * own.slope + (1.0 - floor_) * made.slope;
   }
   const AveragingGrid::RimLoss loss = grid_.rim_loss(xy);
   made.z -= loss.z;
@@ -332,6 +416,7 @@ std::int64_t band_start(std::int64_t band, std::int64_t count) { return band * c
 MadeNodes::MadeNodes(const GridShape& net, const Eigen::Vector2d& size, int samples,
                      const MadeBy& made, const Executor& executor)
     : executor_(executor),
+      floor_(made.polish_floor),
       grid_(size, made),
       net_{net, Eigen::Matrix3Xd(3, Eigen::Index{net.columns} * net.rows)},
       plan_(spline_nodes_on(net, samples, executor)),
@@ -339,7 +424,7 @@ MadeNodes::MadeNodes(const GridShape& net, const Eigen::Vector2d& size, int samp
       samples_(grid_.lines(0).size() * grid_.lines(1).size()),
       nodes_(static_cast<std::size_t>(shape().columns) * static_cast<std::size_t>(shape().rows)),
       plan_bar_(3 * nodes_.size()),
-      no_bar_(3 * nodes_.size(), 0.0) {}
+      normal_bar_(3 * nodes_.size(), 0.0) {}
 
 void MadeNodes::look(const double* points, double* positions, double* normals) {
   std::copy_n(points, net_.points.size(), net_.points.data());
@@ -347,6 +432,7 @@ void MadeNodes::look(const double* points, double* positions, double* normals) {
       executor_, "heights to polish", static_cast<std::int64_t>(grid_.lines(1).size()),
       [&](std::int64_t row) { sample_row(static_cast<std::size_t>(row)); }, 1);
   grid_.continue_beyond_rim(heights_);
+  filtered_ = grid_.filtered(heights_, executor_);
   known_ = true;
   plan_.look(points, positions, normals);
   parallel_for(executor_, "made nodes", static_cast<std::int64_t>(nodes_.size()),
@@ -402,23 +488,28 @@ void MadeNodes::average(std::int64_t i, double* positions, double* normals) {
   const GaussianWeights x = grid_.weights(node.place.x(), 0);
   const GaussianWeights y = grid_.weights(node.place.y(), 1);
   const double* const block =
-      &heights_(grid_.first_sample(node.place.x(), 0), grid_.first_sample(node.place.y(), 1));
-  const BlockRow value = weighted_rows(block, heights_.rows(), y.value);
-  const BlockRow slope = weighted_rows(block, heights_.rows(), y.slope);
-  const BlockRow bend = weighted_rows(block, heights_.rows(), y.bend);
+      &filtered_(grid_.first_sample(node.place.x(), 0), grid_.first_sample(node.place.y(), 1));
+  const BlockRow value = weighted_rows(block, filtered_.rows(), y.value);
+  const BlockRow slope = weighted_rows(block, filtered_.rows(), y.slope);
+  const BlockRow bend = weighted_rows(block, filtered_.rows(), y.bend);
   const AveragingGrid::RimLoss loss = grid_.rim_loss(node.place);
-  const double mixed = dot(slope, x.slope);
-  node.slope = Eigen::Vector2d(dot(value, x.slope), dot(slope, x.value)) - loss.slope;
-  node.bend << dot(value, x.bend) - loss.bend.x(), mixed, mixed, dot(bend, x.value) - loss.bend.y();
-  column3(positions, i).z() = dot(value, x.value) - loss.z;
-  column3(normals, i) << -node.slope, 1.0;
+  const double rest = 1.0 - floor_;
+  const double mixed = rest * dot(slope, x.slope);
+  node.slope = rest * Eigen::Vector2d(dot(value, x.slope), dot(slope, x.value)) - loss.slope;
+  node.bend << rest * dot(value, x.bend) - loss.bend.x(), mixed, mixed,
+      rest * dot(bend, x.value) - loss.bend.y();
+  node.normal = column3(normals, i);
+  const double own = floor_ == 0.0 ? 0.0 : floor_ * column3(positions, i).z();
+  column3(positions, i).z() = own + rest * dot(value, x.value) - loss.z;
+  column3(normals, i) << floor_ / node.normal.z() * node.normal.head<2>() - node.slope, 1.0;
 }
 
 void MadeNodes::look_adjoint(const double* position_bar, const double* normal_bar,
                              double* points_bar) {
   spread_nodes(position_bar, normal_bar);
+  heights_bar_ = grid_.filtered_adjoint(heights_bar_, executor_);
   grid_.continue_beyond_rim_adjoint(heights_bar_);
-  plan_.look_adjoint(plan_bar_.data(), no_bar_.data(), points_bar);
+  plan_.look_adjoint(plan_bar_.data(), normal_bar_.data(), points_bar);
   spread_samples(points_bar);
 }
 
@@ -440,7 +531,8 @@ void MadeNodes::spread_nodes(const double* position_bar, const double* normal_ba
     }
     return std::pair(low, high + static_cast<int>(kCount) - 1);
   };
-  BandSums sums(heights_.rows());
+  BandSums sums(filtered_.rows());
+  const double rest = 1.0 - floor_;
   const auto spread = [&](std::int64_t band, BandSums::Band& to) {
     const auto [begin, end] = nodes_of(band);
     for (std::int64_t i = begin; i < end; ++i) {
@@ -449,15 +541,18 @@ void MadeNodes::spread_nodes(const double* position_bar, const double* normal_ba
       const Eigen::Vector2d slope_bar = -column3(normal_bar, i).head<2>();
       column3(plan_bar_.data(), i)
           << column3(position_bar, i).head<2>() + z_bar * node.slope + node.bend * slope_bar,
-          0.0;
+          floor_ * z_bar;
+      const Eigen::Vector2d of_normal = floor_ / node.normal.z() * slope_bar;
+      column3(normal_bar_.data(), i) << -of_normal,
+          of_normal.dot(node.normal.head<2>()) / node.normal.z();
       const GaussianWeights x = grid_.weights(node.place.x(), 0);
       const GaussianWeights y = grid_.weights(node.place.y(), 1);
       const int column = grid_.first_sample(node.place.x(), 0);
       const int row = grid_.first_sample(node.place.y(), 1);
       for (std::size_t n = 0; n < kCount; ++n) {
         double* const heights_bar = to.row(row + static_cast<Eigen::Index>(n)) + column;
-        const double by_value = y.value[n] * z_bar + y.slope[n] * slope_bar.y();
-        const double by_slope = y.value[n] * slope_bar.x();
+        const double by_value = rest * (y.value[n] * z_bar + y.slope[n] * slope_bar.y());
+        const double by_slope = rest * y.value[n] * slope_bar.x();
         for (std::size_t m = 0; m < kCount; ++m) {
           heights_bar[m] += by_value * x.value[m] + by_slope * x.slope[m];
         }
@@ -465,9 +560,9 @@ void MadeNodes::spread_nodes(const double* position_bar, const double* normal_ba
     }
   };
   sums.run(executor_, "made nodes adjoint", rows_of, spread);
-  heights_bar_ = Eigen::MatrixXd::Zero(heights_.rows(), heights_.cols());
+  heights_bar_ = Eigen::MatrixXd::Zero(filtered_.rows(), filtered_.cols());
   parallel_for(
-      executor_, "sum heights adjoint", heights_.cols(),
+      executor_, "sum heights adjoint", filtered_.cols(),
       [&](std::int64_t j) { sums.add_row(j, heights_bar_.col(j).data()); }, 16);
 }
 
@@ -514,6 +609,84 @@ void MadeNodes::spread_samples(double* points_bar) {
   parallel_for(
       executor_, "sum points adjoint", net_.shape.rows,
       [&](std::int64_t j) { sums.add_row(j, points_bar + j * row_size); }, 16);
+}
+
+HeightTerms::HeightTerms(const std::vector<AxisBasis>& u, const std::vector<AxisBasis>& v,
+                         const Executor& executor)
+    : executor_(executor) {
+  for (std::size_t n = 1; n < u.size(); ++n) terms_.push_back({{u[n], executor}, {v[n], executor}});
+  along_.resize(2 * static_cast<std::size_t>(u[0].nodes()) *
+                static_cast<std::size_t>(v[0].coefficients));
+}
+
+void HeightTerms::add(const double* points, double* heights) {
+  for (const Term& term : terms_) {
+    const AxisTaps u = term.u.view();
+    const AxisTaps v = term.v.view();
+    const std::int64_t nodes_u = term.u.nodes();
+    const std::int64_t columns = term.u.coefficients();
+    const auto along_row = [&](std::int64_t i) {
+      const std::int64_t node = i % nodes_u;
+      const std::int64_t at = i / nodes_u * columns + u.first[node];
+      double value = 0.0;
+      double slope = 0.0;
+      for (int k = 0; k < u.taps; ++k) {
+        const double z = points[3 * (at + k) + 2];
+        value += u.value[u.taps * node + k] * z;
+        slope += u.slope[u.taps * node + k] * z;
+      }
+      along_[static_cast<std::size_t>(2 * i)] = value;
+      along_[static_cast<std::size_t>(2 * i + 1)] = slope;
+    };
+    parallel_for(executor_, "height terms along rows", nodes_u * term.v.coefficients(), along_row);
+    const auto across_rows = [&](std::int64_t i) {
+      const std::int64_t node = i / nodes_u;
+      const double* const along =
+          &along_[static_cast<std::size_t>(2 * (v.first[node] * nodes_u + i % nodes_u))];
+      auto sum = column3(heights, i);
+      for (int k = 0; k < v.taps; ++k) {
+        const double* const a = along + 2 * k * nodes_u;
+        const double value = v.value[v.taps * node + k];
+        sum += Eigen::Vector3d(value * a[1], v.slope[v.taps * node + k] * a[0], value * a[0]);
+      }
+    };
+    parallel_for(executor_, "height terms", nodes_u * term.v.nodes(), across_rows);
+  }
+}
+
+void HeightTerms::add_adjoint(const double* heights_bar, double* points_bar) {
+  for (const Term& term : terms_) {
+    const AxisTaps u = term.u.view();
+    const AxisTaps v = term.v.view();
+    const std::int64_t nodes_u = term.u.nodes();
+    const std::int64_t columns = term.u.coefficients();
+    const auto across_rows = [&](std::int64_t i) {
+      const std::int64_t row = i / nodes_u;
+      double value_bar = 0.0;
+      double slope_bar = 0.0;
+      for (std::int64_t node = v.begin[row]; node < v.end[row]; ++node) {
+        const std::int64_t tap = v.taps * node + row - v.first[node];
+        const auto bar = column3(heights_bar, node * nodes_u + i % nodes_u);
+        value_bar += v.value[tap] * bar.z() + v.slope[tap] * bar.y();
+        slope_bar += v.value[tap] * bar.x();
+      }
+      along_[static_cast<std::size_t>(2 * i)] = value_bar;
+      along_[static_cast<std::size_t>(2 * i + 1)] = slope_bar;
+    };
+    parallel_for(executor_, "height terms adjoint", nodes_u * term.v.coefficients(), across_rows);
+    const auto along_row = [&](std::int64_t i) {
+      const std::int64_t column = i % columns;
+      const double* const bars = &along_[static_cast<std::size_t>(2 * (i / columns * nodes_u))];
+      double sum = 0.0;
+      for (std::int64_t node = u.begin[column]; node < u.end[column]; ++node) {
+        const std::int64_t tap = u.taps * node + column - u.first[node];
+        sum += u.value[tap] * bars[2 * node] + u.slope[tap] * bars[2 * node + 1];
+      }
+      points_bar[3 * i + 2] += sum;
+    };
+    parallel_for(executor_, "height terms along rows adjoint", columns * term.v.coefficients(),
+                 along_row);
+  }
 }
 
 }  // namespace lensforge

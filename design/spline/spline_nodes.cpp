@@ -6,13 +6,14 @@
 #include <cstddef>
 
 #include "core/lens/continued_surface.h"
+#include "core/optics/polish_transfer.h"
 #include "core/spline/cubic_spline.h"
 
 namespace lensforge {
 namespace {
 
 /// Radius of the Gaussian, in σ, as in PolishedField.
-constexpr double kReach = 5.0;
+constexpr double kGaussianReach = 5.0;
 
 /// Points per σ of the sum that replaces its integral.
 constexpr int kPointsPerSigma = 32;
@@ -31,7 +32,7 @@ struct SumPoint {
 /// with its variance v and κ = 3, both as computed from the points: so derivatives of a straight
 /// line are exact.
 std::vector<SumPoint> gaussian_points(double sigma) {
-  const int count = static_cast<int>(kReach * kPointsPerSigma);
+  const int count = static_cast<int>(kGaussianReach * kPointsPerSigma);
   std::vector<SumPoint> points;
   double total = 0.0;
   for (int i = -count; i <= count; ++i) {
@@ -55,6 +56,46 @@ std::vector<SumPoint> gaussian_points(double sigma) {
     p.third = (fourth / (v * v) - square) * p.at / (v * v) * p.weight;
   }
   return points;
+}
+
+/// Points of a film's term and its derivatives.
+std::vector<SumPoint> film_points(const LineTerm& term, double sigma) {
+  const int count = static_cast<int>(kFilmReach * kPointsPerSigma);
+  std::vector<SumPoint> points;
+  for (int i = -count; i <= count; ++i) {
+    const double t = static_cast<double>(i) / kPointsPerSigma;
+    const double weight = 1.0 / kPointsPerSigma;
+    points.push_back({t * sigma, weight * term.kernel(t, 0), weight / sigma * term.kernel(t, 1),
+                      weight / (sigma * sigma) * term.kernel(t, 2),
+                      weight / std::pow(sigma, 3) * term.kernel(t, 3)});
+  }
+  return points;
+}
+
+/// Makes a film's terms exact for constants, and their slopes for straight lines.
+void straighten(std::vector<std::vector<SumPoint>>& terms) {
+  double mean = 0.0;
+  double rise = 0.0;
+  for (std::size_t n = 0; n < terms.size(); ++n) {
+    double of_term = 0.0;
+    double rise_of_term = 0.0;
+    for (const SumPoint& p : terms[n]) {
+      of_term += p.weight;
+      rise_of_term -= p.first * p.at;
+    }
+    mean += film_terms()[n].sign * of_term * of_term;
+    rise += film_terms()[n].sign * of_term * rise_of_term;
+  }
+  const double by_mean = 1.0 / std::sqrt(mean);
+  const double by_rise = std::sqrt(mean) / rise;
+  for (std::vector<SumPoint>& term : terms) {
+    for (SumPoint& p : term) {
+      p.weight *= by_mean;
+      p.first *= by_rise;
+      p.second *= by_mean;
+      p.third *= by_rise;
+    }
+  }
 }
 
 /// One node as a sum over all coefficients.
@@ -139,20 +180,21 @@ AxisBasis plain_basis(int cells, const std::vector<double>& points) {
   return basis;
 }
 
-AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
-                     const MadeBy& made) {
+namespace {
+
+/// The spline averaged with these points, in knot cells.
+AxisBasis averaged_basis(const AxisLength& along, const std::vector<double>& points,
+                         const MadeBy& made, const std::vector<SumPoint>& sum_points) {
   const double cell = along.length / along.cells;
-  const double sigma = made.polish_sigma / cell;
   const bool across = made.rows_along_x == (along.axis == 1);
   const double bend = across ? std::pow(made.pitch / cell, 2) / 24.0 : 0.0;
-  const std::vector<SumPoint> gaussian = gaussian_points(sigma);
-  const int reach = static_cast<int>(std::ceil(kReach * sigma));
+  const int reach = static_cast<int>(std::ceil(sum_points.back().at));
   AxisBasis basis;
   basis.coefficients = along.cells + 3;
   basis.taps = std::min(basis.coefficients, 2 * reach + 4);
   for (const double t : points) {
     NodeSum sum(along.cells, cell);
-    for (const SumPoint& g : gaussian) {
+    for (const SumPoint& g : sum_points) {
       sum.add(t - g.at, g.weight + bend * g.second, g.first + bend * g.third);
     }
     const int here = std::min(static_cast<int>(t), along.cells - 1);
@@ -164,6 +206,43 @@ AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
     basis.tilt.push_back((low - high) * cell / made.rim_length);
   }
   return basis;
+}
+
+void weigh(AxisBasis& basis, double weight) {
+  for (double& value : basis.value) value *= weight;
+  for (double& slope : basis.slope) slope *= weight;
+}
+
+}  // namespace
+
+/// Weights of the terms are in the bases along y.
+std::vector<AxisBasis> made_bases(const AxisLength& along, const std::vector<double>& points,
+                                  const MadeBy& made) {
+  const double sigma = made.polish_sigma * along.cells / along.length;
+  std::vector<AxisBasis> bases;
+  if (made.polish_order == kFilmOrder) {
+    std::vector<std::vector<SumPoint>> terms;
+    for (const LineTerm& term : film_terms()) terms.push_back(film_points(term, sigma));
+    straighten(terms);
+    for (std::size_t n = 0; n < terms.size(); ++n) {
+      bases.push_back(averaged_basis(along, points, made, terms[n]));
+      if (along.axis == 1) weigh(bases.back(), film_terms()[n].sign);
+    }
+  } else {
+    bases.push_back(averaged_basis(along, points, made, gaussian_points(sigma)));
+  }
+  if (made.polish_floor == 0.0) return bases;
+  bases.push_back(plain_basis(along.cells, points));
+  if (along.axis == 0) return bases;
+  for (AxisBasis& basis : bases) weigh(basis, 1.0 - made.polish_floor);
+  bases.back() = plain_basis(along.cells, points);
+  weigh(bases.back(), made.polish_floor);
+  return bases;
+}
+
+AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
+                     const MadeBy& made) {
+  return made_bases(along, points, made).front();
 }
 
 }  // namespace lensforge

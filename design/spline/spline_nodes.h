@@ -50,7 +50,15 @@ struct AxisLength {
 /// the depth polished off at the rim. It is linear in the coefficients, so the made surface is a
 /// sum of the same coefficients with other functions. For a spline with uneven knots it is an
 /// approximation.
+///
+/// Where the polish's transfer is no product of functions along x and y (PolishTransfer), the made
+/// height is a sum of products, one for each basis of this list along x and the same of that along
+/// y: the terms of a film, and for a floor the spline itself. The first has rim and plan.
 /// @param points  as for plain_basis(). @pre made.polish_sigma > 0.
+std::vector<AxisBasis> made_bases(const AxisLength& along, const std::vector<double>& points,
+                                  const MadeBy& made);
+
+/// The first of made_bases(): all of it for a Gaussian without a floor.
 AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
                      const MadeBy& made);
 

@@ -45,14 +45,14 @@ TEST(CouponModel, PolishedScallopsAreTheAverageOfArcs) {
     for (const double share : {0.02, 0.1, 0.2, 0.35, 0.5}) {
       const double sigma = share * pitch;
       const double slow = averaged(pitch, sigma, 0.5 * pitch) - averaged(pitch, sigma, 0.0);
-      EXPECT_NEAR(PolishedScallop(kRadius, pitch, sigma).height(), slow, 3e-4 * slow)
+      EXPECT_NEAR(PolishedScallop(kRadius, pitch, {sigma}).height(), slow, 3e-4 * slow)
           << pitch << " " << share;
     }
   }
 }
 
 TEST(CouponModel, ScallopsThatAreNotPolishedKeepTheirHeight) {
-  EXPECT_NEAR(PolishedScallop(kRadius, 0.1, 0.0).height(), scallop_height(kRadius, 0.1), 1e-15);
+  EXPECT_NEAR(PolishedScallop(kRadius, 0.1, {0.0}).height(), scallop_height(kRadius, 0.1), 1e-15);
 }
 
 TEST(CouponModel, LittleIsLeftOfNarrowPasses) {
@@ -62,13 +62,13 @@ TEST(CouponModel, LittleIsLeftOfNarrowPasses) {
   const double parabola = pitch * pitch / (8.0 * kRadius);
   const double first = 4.0 * parabola / std::pow(std::numbers::pi, 2) *
                        std::exp(-2.0 * std::pow(std::numbers::pi * sigma / pitch, 2));
-  EXPECT_NEAR(PolishedScallop(kRadius, pitch, sigma).height(), 2.0 * first, 0.02 * first);
+  EXPECT_NEAR(PolishedScallop(kRadius, pitch, {sigma}).height(), 2.0 * first, 0.02 * first);
 }
 
 TEST(CouponModel, OrdersOfAWaveAreBesselFunctions) {
   // At σ = 0.4 p the second harmonic is 3e-9 of the first: a cosine, whose orders are J_k(φ a).
   const double pitch = 0.09;
-  const PolishedScallop wave(kRadius, pitch, 0.4 * pitch);
+  const PolishedScallop wave(kRadius, pitch, {0.4 * pitch});
   for (const double delay : {0.1, 0.8, 1.5, 3.5}) {
     const double phase = delay / (0.5 * wave.height());
     const double bessel = std::pow(std::cyl_bessel_j(1, delay) / std::cyl_bessel_j(0, delay), 2);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "cam/cam.h"
@@ -8,6 +9,7 @@
 #include "cam/coupon/coupon_fit.h"
 #include "cam/coupon/coupon_job.h"
 #include "cam/coupon/coupon_simulation.h"
+#include "core/error.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {
@@ -29,11 +31,13 @@ CouponReadings simulated(const CouponOptions& options, const TrueWorkshop& shop)
   return simulation.measured(expected_readings(coupon.layout, options.workshop));
 }
 
-Workshop true_workshop(Workshop workshop) {
-  workshop.polish.sigma = kTrue.sigma;
-  workshop.process.finish.pitch_error = kTrue.pitch_error;
+Workshop true_workshop(Workshop workshop, const TrueWorkshop& shop = kTrue) {
+  workshop.polish.sigma = shop.sigma;
+  workshop.polish.order = shop.order;
+  workshop.polish.floor = shop.floor;
+  workshop.process.finish.pitch_error = shop.pitch_error;
   for (Tool& tool : workshop.tools) {
-    if (tool.number == workshop.process.finish.tool) tool.diameter = 2.0 * kTrue.radius;
+    if (tool.number == workshop.process.finish.tool) tool.diameter = 2.0 * shop.radius;
   }
   return workshop;
 }
@@ -83,6 +87,57 @@ TEST(CouponRoundTrip, NoiseIsCarriedThroughAsStated) {
   expect_chi_square(readings, freedom);
 }
 
+/// How the fits of 40 noisy coupons of one polish judge its order.
+struct OrderCount {
+  int right = 0;  ///< By three standard errors.
+  int wrong = 0;
+  double least = 1e9;  ///< Standard errors.
+};
+
+OrderCount judged(const CouponReadings& exact, const Workshop& workshop, int order) {
+  constexpr std::uint32_t kSeeds = 40;
+  OrderCount count;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    const CouponFit fit = fit_coupon(testing::with_noise(exact, seed), workshop, "readings");
+    if (fit.order.determined) ++(fit.order.value == order ? count.right : count.wrong);
+    count.least = std::min(count.least, fit.order_apart);
+  }
+  return count;
+}
+
+/// The workshop's file always says order 2: a film is found against it.
+TEST(CouponRoundTrip, ReadingsTellPadsFromAFilm) {
+  for (const double sigma : {0.03, 0.036}) {
+    for (const int order : {2, 4}) {
+      const CouponOptions options;
+      TrueWorkshop shop = kTrue;
+      shop.sigma = sigma;
+      shop.order = order;
+      const OrderCount count = judged(simulated(options, shop), options.workshop, order);
+      EXPECT_EQ(count.right, 40) << sigma << ' ' << order << ": least " << count.least;
+      EXPECT_EQ(count.wrong, 0);
+    }
+  }
+}
+
+TEST(CouponRoundTrip, AFloorIsFoundWithItsOrder) {
+  const CouponOptions options;
+  for (const int order : {2, 4}) {
+    TrueWorkshop shop = kTrue;
+    shop.order = order;
+    shop.floor = 0.08;
+    const CouponReadings exact = simulated(options, shop);
+    const CouponFit fit = fit_coupon(exact, options.workshop, "readings");
+    EXPECT_EQ(fit.order.value, order);
+    EXPECT_TRUE(fit.order.determined) << fit.order_apart;
+    ASSERT_TRUE(fit.floor.determined);
+    EXPECT_NEAR(fit.floor.value, shop.floor, 0.1 * fit.floor.uncertainty);
+    EXPECT_NEAR(fit.sigma.value, shop.sigma, 0.1 * fit.sigma.uncertainty);
+    const OrderCount count = judged(exact, options.workshop, order);
+    EXPECT_EQ(count.right, 40) << order << ": least " << count.least;
+  }
+}
+
 TEST(CouponRoundTrip, PassesAlongYAndOneWayAreReadAsWell) {
   CouponOptions options;
   options.workshop.process.finish.along = PassAxis::kY;
@@ -117,6 +172,36 @@ TEST(CouponRoundTrip, TheForecastOfTheFittedWorkshopIsThatOfTheTrueOne) {
   const double error = std::abs(believed.leakage - truth.leakage);
   EXPECT_GT(error, 0.05 * truth.leakage) << "the coupon would not be worth it";
   EXPECT_LT(std::abs(fitted.leakage - truth.leakage), 0.15 * error);
+}
+
+/// The same readings with uncertainties so large that they do not contradict a wrong order.
+CouponReadings less_certain(CouponReadings readings) {
+  const auto widen = [](std::optional<Reading>& reading) {
+    if (reading) reading->uncertainty *= 4.0;
+  };
+  for (PadReadings& pad : readings.pads) {
+    for (auto kind : {&PadReadings::before, &PadReadings::after, &PadReadings::orders}) {
+      widen(pad.*kind);
+    }
+  }
+  for (GrooveReadings& groove : readings.grooves) widen(groove.width);
+  return readings;
+}
+
+/// A fit that is forced to the wrong order predicts 10 to 15 % too much or too little leakage; with
+/// the uncertainties of the template it is refused.
+TEST(CouponRoundTrip, TheForecastOfTheWrongOrderIsOffByASeventh) {
+  const CouponOptions options;
+  for (const int order : {2, 4}) {
+    TrueWorkshop shop = kTrue;
+    shop.order = order;
+    const CouponReadings exact = simulated(options, shop);
+    EXPECT_THROW(fit_coupon(exact, options.workshop, "readings", 6 - order), InputError);
+    const CouponFit fit = fit_coupon(less_certain(exact), options.workshop, "readings", 6 - order);
+    const PictureQuality fitted = forecast(fit.applied_to(options.workshop));
+    const PictureQuality truth = forecast(true_workshop(options.workshop, shop));
+    EXPECT_NEAR(fitted.leakage, truth.leakage, 0.16 * truth.leakage) << order;
+  }
 }
 
 }  // namespace

@@ -23,6 +23,8 @@ struct TrueWorkshop {
   double radius = 0.2;
   double pitch_error = 0.0;  ///< Share of a length, across the passes.
   double touch_off = 0.0;    ///< Extra depth of all cuts.
+  int order = 2;             ///< Of the polish.
+  double floor = 0.0;        ///< Share of a ripple that it leaves.
 };
 
 /// Heights along a line across the passes, equally spaced; mm.
@@ -48,7 +50,8 @@ class CouponSimulation {
   }
 
   /// The readings of `expected` as good tools take them, without noise: heights to 5 % or 0.05 µm,
-  /// light to 15 %. Heights that are less than three uncertainties are not read.
+  /// light to 15 %. Heights that are less than three uncertainties are not read, nor is light
+  /// fainter than 0.2 %.
   [[nodiscard]] CouponReadings measured(CouponReadings expected) const {
     for (MarkReadings& mark : expected.marks) {
       mark.distance->value = bottom_of(layout_.marks[1]) - bottom_of(layout_.marks[0]);
@@ -64,7 +67,7 @@ class CouponSimulation {
       pad.after = tester(height_of(polished));
       if (pad.orders) {
         const double ratio = order_ratio(polished, pad.pitch, expected.light.phase());
-        pad.orders = Reading{ratio, 0.15 * ratio};
+        pad.orders = meter(ratio);
       }
     }
     return expected;
@@ -126,25 +129,40 @@ class CouponSimulation {
     return line.begin + line.step * static_cast<double>(lowest - line.z.begin());
   }
 
-  /// The middle of a pad, seven σ and a millimetre of it.
+  /// The middle of a pad, its kernel's reach and a millimetre of it.
   [[nodiscard]] AcrossProfile pad_profile(const CouponPad& pad) const {
     const double middle = (1.0 + shop_.pitch_error) * pad.box.center().y();
-    const double half = 0.6 + 6.0 * shop_.sigma;
+    const double half = 0.6 + reach();
     return profile(pad.box.center().x(), middle - half, middle + half, 5e-4);
   }
+  [[nodiscard]] double reach() const { return (shop_.order == 4 ? 14.0 : 6.0) * shop_.sigma; }
+  /// Of the kernel at a distance in σ: a Gaussian, or the sum of a film's waves.
+  [[nodiscard]] double kernel(double t) const {
+    if (shop_.order == 2) return std::exp(-0.5 * t * t);
+    constexpr double kPart = 0.01;
+    double sum = 0.0;
+    for (double k = 0.5 * kPart; k < 4.0; k += kPart) {
+      sum += std::exp(-0.25 * std::pow(k, 4)) * std::cos(k * t);
+    }
+    return sum;
+  }
   [[nodiscard]] AcrossProfile averaged(const AcrossProfile& raw) const {
-    const auto reach = static_cast<std::int64_t>(std::ceil(6.0 * shop_.sigma / raw.step));
+    const auto reach = static_cast<std::int64_t>(std::ceil(this->reach() / raw.step));
+    std::vector<double> kernels;
+    for (std::int64_t k = 0; k <= reach; ++k) {
+      kernels.push_back(kernel(raw.step * static_cast<double>(k) / shop_.sigma));
+    }
     AcrossProfile result{raw.begin + raw.step * static_cast<double>(reach), raw.step, {}};
     for (std::int64_t i = reach; i + reach < static_cast<std::int64_t>(raw.z.size()); ++i) {
       double sum = 0.0;
       double weights = 0.0;
       for (std::int64_t k = -reach; k <= reach; ++k) {
-        const double t = raw.step * static_cast<double>(k) / shop_.sigma;
-        const double weight = std::exp(-0.5 * t * t);
+        const double weight = kernels[static_cast<std::size_t>(std::abs(k))];
         sum += weight * raw.z[static_cast<std::size_t>(i + k)];
         weights += weight;
       }
-      result.z.push_back(sum / weights);
+      result.z.push_back(shop_.floor * raw.z[static_cast<std::size_t>(i)] +
+                         (1.0 - shop_.floor) * sum / weights);
     }
     return result;
   }
@@ -152,6 +170,10 @@ class CouponSimulation {
     const double uncertainty = std::max(5e-5, 0.05 * height);
     if (height < 3.0 * uncertainty) return std::nullopt;
     return Reading{height, uncertainty};
+  }
+  static std::optional<Reading> meter(double ratio) {
+    if (ratio < 0.002) return std::nullopt;
+    return Reading{ratio, 0.15 * ratio};
   }
   static double height_of(const AcrossProfile& line) {
     const auto [low, high] = std::minmax_element(line.z.begin(), line.z.end());

@@ -30,6 +30,15 @@ TEST(WorkshopEdit, NumbersAreReplacedWhereTheyStand) {
             "rim_depth = 0\n\n[finish]\npitch_error = -0.00125\npitch = 0.05  # fine\n");
 }
 
+TEST(WorkshopEdit, OrderAndFloorAreReplacedToo) {
+  const std::string text = "[polish]\norder = 2  # felt\nsigma = 0.03\n";
+  Workshop shop = parse_workshop(text, "shop.toml");
+  shop.polish.order = 4;
+  shop.polish.floor = 0.05;
+  EXPECT_EQ(edited_workshop(text, shop),
+            "[polish]\nfloor = 0.05\norder = 4  # felt\nsigma = 0.03\n");
+}
+
 TEST(WorkshopEdit, KeysAndTablesThatAreMissingAreAdded) {
   const std::string text = "[finish]  # raster\npitch = 0.05";
   EXPECT_EQ(

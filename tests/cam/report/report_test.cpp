@@ -12,7 +12,6 @@
 
 #include "cam/report/report_data.h"
 #include "cam/report/report_html.h"
-#include "cam/report/report_json.h"
 #include "cam/report/verdict.h"
 #include "core/error.h"
 #include "core/page/html_page.h"

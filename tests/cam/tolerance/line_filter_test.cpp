@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "cam/tolerance/part_model.h"
 
@@ -57,6 +58,34 @@ TEST(LineFilter, PolishesWavesOfFiveNodesAndMoreAsTheGaussianDoes) {
               filter, [&](double node) { return box_mean(polish, k, 0.7, node * polish.spacing); });
           EXPECT_NEAR(wave.average, kept * std::cos(k * place + 0.7), 2e-3);
           EXPECT_NEAR(wave.slope, -k * kept * std::sin(k * place + 0.7), 2e-3 * k);
+        }
+      }
+    }
+  }
+}
+
+/// The response of a polish's filters to a wave (kx, ky), of the second axis at its nodes: the
+/// products of responses to waves of height 1 at place 0.
+TEST(LineFilter, TermsOfAFilmLevelWavesInAllDirections) {
+  const double sigma = 0.03;
+  for (const auto& [box, samples] : {std::pair(0.06, 6), std::pair(0.03, 2)}) {
+    for (const double floor : {0.0, 0.1}) {
+      const PolishTransfer film{sigma, kFilmOrder, floor};
+      const LinePolish polish{sigma, 0.03, box, samples};
+      const std::vector<AxisFilters> terms = polish_filters(film, polish, 1);
+      const auto response = [&](const LineFilter& filter, double k) {
+        return apply(filter, [&](double node) { return box_mean(polish, k, 0.0, node * 0.03); })
+            .average;
+      };
+      for (const double nodes_x : {5.0, 7.0, 20.0, 1000.0}) {
+        for (const double nodes_y : {5.0, 9.0, 40.0}) {
+          const double kx = 2.0 * std::numbers::pi / (nodes_x * 0.03);
+          const double ky = 2.0 * std::numbers::pi / (nodes_y * 0.03);
+          double left = 0.0;
+          for (const AxisFilters& term : terms) {
+            left += term.weight * response(term.filters[0], kx) * response(term.filters[0], ky);
+          }
+          EXPECT_NEAR(left, film.at(std::hypot(kx, ky)), 3e-3) << nodes_x << ' ' << nodes_y;
         }
       }
     }

@@ -8,6 +8,8 @@
 #include <memory>
 #include <numbers>
 #include <stop_token>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "cam/cam_meshes.h"
@@ -266,6 +268,50 @@ TEST_F(PartModelTest, AnotherPolishChangesItAsInTheChain) {
     error.sigma_factor = sigma / kSigma;
     expect_same_change(chain(*milled_, sigma, setup()), of_model(error));
   }
+}
+
+/// A film, and both orders with a floor, whose scallops stay in part.
+TEST_F(PartModelTest, PartsOfOtherPolishesAreThoseOfTheChain) {
+  for (const auto& [order, floor] : {std::pair(4, 0.0), {2, 0.03}, {4, 0.03}}) {
+    SCOPED_TRACE(std::to_string(order) + " floor " + std::to_string(floor));
+    PartPlan plan = part_plan();
+    plan.polish.order = order;
+    plan.polish.floor = floor;
+    const PartModel model(*milled_, plan, executor(), RunControl());
+    for (const double factor : {1.0, 0.8, 1.2}) {
+      PolishModel polish = plan.polish;
+      polish.sigma *= factor;
+      PartError error;
+      error.sigma_factor = factor;
+      const PolishedField part(*milled_, {Eigen::Vector2d(0, 0), Eigen::Vector2d(kSide, kSide)},
+                               polish);
+      const double samples = floor > 0.0 ? 24.4 : 6.1;  // Of a pitch, as cam's.
+      const FieldRenderSetup as_cam{setup(), lens_grid(setup().lens_size, kPitch / samples)};
+      const PictureQuality by_chain = judged(render_field(part, as_cam, executor(), {}));
+      const PictureQuality by_model = judged(model.render(error, executor()));
+      EXPECT_NEAR(by_model.metrics.mae, by_chain.metrics.mae,
+                  std::max(5e-4, 0.1 * by_chain.metrics.mae))
+          << factor;
+      EXPECT_NEAR(by_model.leakage, by_chain.leakage, 0.2 * by_chain.leakage) << factor;
+    }
+  }
+}
+
+/// A polish that is stronger everywhere by its pattern over the part, a wave without length.
+TEST_F(PartModelTest, AFilmThatIsStrongerOverAPartIsAStrongerFilm) {
+  PartPlan plan = part_plan();
+  plan.polish.order = 4;
+  const PartModel model(*milled_, plan, executor(), RunControl());
+  PartError by_factor;
+  by_factor.sigma_factor = 1.1;
+  PartError by_pattern;
+  by_pattern.sigma_within = 0.1 / std::sqrt(2.0);
+  by_pattern.sigma_waves = {{{0.0, 0.0}, 0.0}};
+  const double nominal = judged(model.render({}, executor())).metrics.mae;
+  const double factor = judged(model.render(by_factor, executor())).metrics.mae;
+  const double pattern = judged(model.render(by_pattern, executor())).metrics.mae;
+  EXPECT_NEAR(pattern - nominal, factor - nominal,
+              std::max(1e-4, 0.2 * std::abs(factor - nominal)));
 }
 
 TEST_F(PartModelTest, AnotherIndexAndDistanceChangeItAsInTheChain) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -133,14 +134,71 @@ TEST(MadeSurface, GoesOnAsItIsCutWhereKnotsAreSqueezed) {
   }
 }
 
+/// A spline with the heights f(x, y) to the fourth power of its knot cells.
+ControlNet even_net(const GridShape& shape, const Eigen::Vector2d& size,
+                    const std::function<double(double, double)>& height) {
+  ControlNet net{shape, Eigen::Matrix3Xd(3, Eigen::Index{shape.columns} * shape.rows)};
+  const Eigen::Vector2d cells = net.cells().cast<double>();
+  const Eigen::Vector2d cell = size.cwiseQuotient(cells);
+  for (int j = 0; j < shape.rows; ++j) {
+    for (int i = 0; i < shape.columns; ++i) {
+      const double x = cell.x() * greville_point(i, net.cells().x());
+      const double y = cell.y() * greville_point(j, net.cells().y());
+      // A uniform cubic spline of the coefficients c has the values c + h² c″ / 6 at its knots.
+      const auto bend = [&](double dx, double dy) {
+        return height(x + dx, y + dy) - 2.0 * height(x, y) + height(x - dx, y - dy);
+      };
+      net.points.col(j * shape.columns + i) << x, y,
+          height(x, y) - (bend(cell.x(), 0.0) + bend(0.0, cell.y())) / 6.0;
+    }
+  }
+  return net;
+}
+
+/// What the part keeps of a wave far from its rim, by the closed form: the rows' share, p²/24 f″
+/// across them, is in the smoothed part alone.
+TEST(MadeSurface, AWaveFadesAsTheTransferFunctionSays) {
+  constexpr double kPitch = 0.045;
+  const Eigen::Vector2d size(3.0, 2.4);
+  for (const int order : {2, 4}) {
+    for (const double floor : {0.0, 0.15}) {
+      for (const Eigen::Vector2d& k :
+           {Eigen::Vector2d(5.0, 0.0), {12.0, 9.0}, {0.0, 30.0}, {25.0, -25.0}, {33.0, 10.0}}) {
+        const MadeBy made{kPitch, true, 0.03, 0.0, 1.0, 0.0, order, floor};
+        const auto wave = [&](double x, double y) {
+          return 1e-3 * std::sin(k.x() * x + k.y() * y + 0.3);
+        };
+        const ControlNet net = even_net({603, 483}, size, wave);
+        const MadeSurface surface(net, made, Executor::cpu(2));
+        const double t = std::pow(0.03 * k.norm() / std::numbers::sqrt2, order);
+        const double rows = std::exp(-kPitch * kPitch * k.y() * k.y() / 24.0);
+        const double left = floor + (1.0 - floor) * rows * std::exp(-t);
+        for (const Eigen::Vector2d& at : {Eigen::Vector2d(1.51, 1.23), {1.2, 0.97}}) {
+          const double phase = k.dot(at) + 0.3;
+          const SurfacePoint point = surface.at(at);
+          EXPECT_NEAR(point.z, left * 1e-3 * std::sin(phase), 1e-7)
+              << order << ' ' << k.transpose();
+          const Eigen::Vector2d slope = left * 1e-3 * std::cos(phase) * k;
+          EXPECT_LT((point.slope - slope).norm(), 1e-7 * k.norm()) << order << ' ' << k.transpose();
+        }
+      }
+    }
+  }
+}
+
 TEST(MadeSurface, LeavesAPlaneAsItIs) {
   ControlNet net = warped_net();
   net.points.row(2) = 0.2 * net.points.row(0) - 0.1 * net.points.row(1);
-  const MadeSurface made(net, kMade, Executor::serial());
-  for (const Eigen::Vector2d& at : {Eigen::Vector2d(0.7, 0.4), {0.0, 0.0}, {1.5, 1.0}}) {
-    EXPECT_NEAR(made.at(at).z, 0.2 * at.x() - 0.1 * at.y(), 1e-9);
-    EXPECT_NEAR(made.at(at).slope.x(), 0.2, 1e-9);
-    EXPECT_NEAR(made.at(at).slope.y(), -0.1, 1e-9);
+  MadeBy film = kMade;
+  film.polish_order = 4;
+  film.polish_floor = 0.1;
+  for (const MadeBy& by : {kMade, film}) {
+    const MadeSurface made(net, by, Executor::serial());
+    for (const Eigen::Vector2d& at : {Eigen::Vector2d(0.7, 0.4), {0.0, 0.0}, {1.5, 1.0}}) {
+      EXPECT_NEAR(made.at(at).z, 0.2 * at.x() - 0.1 * at.y(), 1e-9);
+      EXPECT_NEAR(made.at(at).slope.x(), 0.2, 1e-9);
+      EXPECT_NEAR(made.at(at).slope.y(), -0.1, 1e-9);
+    }
   }
 }
 
@@ -196,38 +254,51 @@ struct Looked {
   Eigen::Matrix3Xd normals;
 };
 
-Looked looked(MadeNodes& nodes, const Eigen::Matrix3Xd& points) {
+template <class Nodes>
+Looked looked(Nodes& nodes, const Eigen::Matrix3Xd& points) {
   const Eigen::Index count = Eigen::Index{nodes.shape().columns} * nodes.shape().rows;
   Looked result{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count)};
   nodes.look(points.data(), result.positions.data(), result.normals.data());
   return result;
 }
 
-MadeNodes nodes_of(const ControlNet& net, const Executor& executor = Executor::serial()) {
-  return {net.shape, {15.0, 10.0}, kSamples, kCoarse, executor};
+MadeNodes nodes_of(const ControlNet& net, const Executor& executor = Executor::serial(),
+                   const MadeBy& made = kCoarse) {
+  return {net.shape, {15.0, 10.0}, kSamples, made, executor};
+}
+
+/// A Gaussian, a film, and both with a floor.
+std::vector<MadeBy> polishes() {
+  std::vector<MadeBy> all(4, kCoarse);
+  all[1].polish_order = all[3].polish_order = 4;
+  all[2].polish_floor = all[3].polish_floor = 0.2;
+  return all;
 }
 
 TEST(MadeNodes, AreTheMadeSurfaceAboveTheNodes) {
   const ControlNet net = testing::sample_spline();
-  MadeNodes nodes = nodes_of(net);
-  const SampledSurface expected = made_nodes(net, kCoarse, kSamples, Executor::serial());
-  for (int call = 0; call < 2; ++call) {  // The second one knows where samples lie.
-    const Looked found = looked(nodes, net.points);
-    EXPECT_LE((found.positions - expected.mesh.vertices).cwiseAbs().maxCoeff(), 1e-9);
-    EXPECT_LE((found.normals - expected.normals).cwiseAbs().maxCoeff(), 1e-9);
+  for (const MadeBy& made : polishes()) {
+    MadeNodes nodes = nodes_of(net, Executor::serial(), made);
+    const SampledSurface expected = made_nodes(net, made, kSamples, Executor::serial());
+    for (int call = 0; call < 2; ++call) {  // The second one knows where samples lie.
+      const Looked found = looked(nodes, net.points);
+      EXPECT_LE((found.positions - expected.mesh.vertices).cwiseAbs().maxCoeff(), 1e-9);
+      EXPECT_LE((found.normals - expected.normals).cwiseAbs().maxCoeff(), 1e-9);
+    }
   }
 }
 
-TEST(MadeNodes, AdjointEqualsCentralDifferences) {
-  const ControlNet net = testing::sample_spline();
-  MadeNodes nodes = nodes_of(net);
+/// Checks the adjoint of a random sum of heights and slopes against central differences.
+template <class Nodes>
+void expect_adjoint(Nodes& nodes, const ControlNet& net, bool made_normals) {
   Looked bar = looked(nodes, net.points);
   Random random(5);
   for (double& b : bar.positions.reshaped()) b = random.between(-1.0, 1.0);
   for (double& b : bar.normals.topRows(2).reshaped()) b = random.between(-1.0, 1.0);
-  bar.normals.row(2).setZero();  // Normals are (−slope, 1).
+  if (made_normals) bar.normals.row(2).setZero();  // Normals are (−slope, 1).
   Eigen::Matrix3Xd gradient(3, net.points.cols());
-  nodes.look_adjoint(bar.positions.data(), bar.normals.data(), gradient.data());
+  Eigen::Matrix3Xd normal_bar = bar.normals;  // ShiftedNodes changes it.
+  nodes.look_adjoint(bar.positions.data(), normal_bar.data(), gradient.data());
   const testing::Scalar value = [&](const Eigen::VectorXd& x) {
     const Looked at = looked(nodes, x.reshaped(3, net.points.cols()));
     return at.positions.cwiseProduct(bar.positions).sum() +
@@ -255,10 +326,52 @@ TEST(MadeNodes, AdjointEqualsCentralDifferences) {
   }
 }
 
+TEST(MadeNodes, AdjointEqualsCentralDifferences) {
+  const ControlNet net = testing::sample_spline();
+  for (const MadeBy& made : polishes()) {
+    MadeNodes nodes = nodes_of(net, Executor::serial(), made);
+    expect_adjoint(nodes, net, true);
+  }
+}
+
+TEST(ShiftedNodes, AdjointEqualsCentralDifferences) {
+  const ControlNet net = testing::sample_spline();
+  for (MadeBy made : polishes()) {
+    made.polish_sigma = 0.3;
+    ShiftedNodes nodes(net.shape, {15.0, 10.0}, kSamples, made, Executor::serial());
+    nodes.measure(net.points.data());
+    expect_adjoint(nodes, net, false);
+  }
+}
+
+/// Of even knots the terms are the made surface itself: without a measured shift nodes agree with
+/// it away from the rim.
+TEST(ShiftedNodes, OfEvenKnotsAreTheMadeSurface) {
+  const Eigen::Vector2d size(6.0, 4.5);
+  const ControlNet net = even_net({43, 33}, size, [](double x, double y) {
+    return 1e-3 * (std::sin(5.0 * x + 4.0 * y) + std::cos(9.0 * x) * std::sin(8.0 * y));
+  });
+  for (MadeBy made : polishes()) {
+    made.pitch = 0.06;
+    made.polish_sigma = 0.05;
+    made.rim_depth = 0.0;
+    ShiftedNodes nodes(net.shape, size, kSamples, made, Executor::serial());
+    const Looked found = looked(nodes, net.points);
+    const SampledSurface expected = made_nodes(net, made, kSamples, Executor::cpu(2));
+    for (Eigen::Index n = 0; n < found.positions.cols(); ++n) {
+      const Eigen::Vector2d at = found.positions.col(n).head<2>();
+      if (at.minCoeff() < 1.0 || (size - at).minCoeff() < 1.0) continue;
+      EXPECT_NEAR(found.positions(2, n), expected.mesh.vertices(2, n), 2e-7);
+      const Eigen::Vector2d slope = -found.normals.col(n).head<2>() / found.normals(2, n);
+      EXPECT_LT((slope + expected.normals.col(n).head<2>()).norm(), 2e-6);
+    }
+  }
+}
+
 TEST(MadeNodes, ThreadCountDoesNotChangeABit) {
   const ControlNet net = testing::sample_spline();
-  MadeNodes one = nodes_of(net);
-  MadeNodes two = nodes_of(net, Executor::cpu(2));
+  MadeNodes one = nodes_of(net, Executor::serial(), polishes().back());
+  MadeNodes two = nodes_of(net, Executor::cpu(2), polishes().back());
   const Looked a = looked(one, net.points);
   const Looked b = looked(two, net.points);
   EXPECT_EQ(a.positions, b.positions);
