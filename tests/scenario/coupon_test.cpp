@@ -75,8 +75,9 @@ TEST_F(Coupon, IsMadeSentMeasuredAndUsed) {
                  "--width", "3mm", "--focal", "15mm", "--rounds", "1", "--quality", "draft"})
                 .exit_code,
             0);
-  const Outcome cut = run({"cam", path("lens"), "--no-rough", "--no-semi", "--no-remedies",
-                           "--workshop", path("fitted.toml"), "--json", "--force"});
+  const Outcome cut =
+      run({"cam", path("lens"), "--light-model", "rays", "--no-rough", "--no-semi", "--no-remedies",
+           "--workshop", path("fitted.toml"), "--json", "--force"});
   ASSERT_TRUE(cut.exit_code == 0 || cut.exit_code == 3) << cut.err;
   const nlohmann::json options = cut.json()["options"];
   EXPECT_EQ(options["polish-sigma"], values["polish.sigma"]["value"]);

@@ -52,8 +52,8 @@ TEST_F(FullDisk, WhatWasToBeSaidBesidesIsLeftOut) {
 
 TEST_F(FullDisk, CamUnderAFileSizeLimitLeavesNoProgram) {
   place_small_lens(at("lens"));
-  expect_refusal(run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm", "--no-rough",
-                      "--no-semi", "--quiet"},
+  expect_refusal(run({"cam", path("lens"), "--light-model", "rays", "--pitch", "2mm",
+                      "--tool-diameter", "4mm", "--no-rough", "--no-semi", "--quiet"},
                      8 * kKibibyte),
                  1, {"finish.ngc", "File too large"});
   EXPECT_EQ(listing(at("lens/cam")), std::vector<std::string>{});

@@ -27,8 +27,9 @@ class Interrupt : public Scenario {
   [[nodiscard]] std::vector<Arguments> commands() const {
     return {small_design(picture("rings.png"), path("new")),
             {"render", path("lens"), "--pixels", "2000", "--out", path("new.png")},
-            {"cam", path("lens"), "--pitch", "0.05mm"},
-            {"nest", path("lens"), "--out", path("sheet"), "--blank", "400,400"},
+            {"cam", path("lens"), "--light-model", "rays", "--pitch", "0.05mm"},
+            {"nest", path("lens"), "--light-model", "rays", "--out", path("sheet"), "--blank",
+             "400,400"},
             {"coupon", "--out", path("coupon")},
             {"export", path("lens"), "--out", path("new.step")},
             {"send", path("job.ngc"), "--port", "sim:grbl"},

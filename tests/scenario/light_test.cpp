@@ -166,8 +166,9 @@ TEST_F(Scenario, ASplineHasTheMetricsThatATracerOfItsFilesFinds) {
 
 TEST_P(EveryLight, IsCutPredictedAndExportedAsAMesh) {
   // A tool may be too short for a steep lens (exit code 3); its picture is predicted even so.
-  const Outcome cut = run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm",
-                           "--no-rough", "--no-semi", "--no-remedies", "--quiet"});
+  const Outcome cut =
+      run({"cam", path("lens"), "--light-model", "rays", "--pitch", "2mm", "--tool-diameter", "4mm",
+           "--no-rough", "--no-semi", "--no-remedies", "--quiet"});
   ASSERT_TRUE(cut.exit_code == 0 || cut.exit_code == 3) << cut.err;
   EXPECT_TRUE(fs::exists(at("lens/cam/finish.ngc")));
   EXPECT_TRUE(fs::exists(at("lens/cam/milled.png")));
@@ -223,8 +224,9 @@ TEST_F(Scenario, ADesignForSeveralColorsIsRenderedInColor) {
   EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr("colours 450:0.5,550:1,650:1 nm"));
   EXPECT_EQ(run({"info", path("lens"), "--json"}).json()["spectrum"], lens["spectrum"]);
   // What is cut of it is predicted in the same light.
-  const Outcome cut = run({"cam", path("lens"), "--pitch", "2mm", "--tool-diameter", "4mm",
-                           "--no-rough", "--no-semi", "--no-remedies", "--quiet"});
+  const Outcome cut =
+      run({"cam", path("lens"), "--light-model", "rays", "--pitch", "2mm", "--tool-diameter", "4mm",
+           "--no-rough", "--no-semi", "--no-remedies", "--quiet"});
   ASSERT_TRUE(cut.exit_code == 0 || cut.exit_code == 3) << cut.err;
   // In the place of another design the picture in colour goes.
   Arguments replaced = design(path("lens"), {});
@@ -246,6 +248,49 @@ struct BadFront {
   Arguments more;
   std::vector<std::string> words;
 };
+
+/// Before a design of pixels that its light cannot show, the command says so, and which it can.
+TEST_F(Scenario, PixelsFinerThanTheLightAreNoted) {
+  const Outcome made = run({"design", picture("stripes.png"), "--out", path("lens"), "--pixels",
+                            "24", "--width", "10mm", "--focal", "30mm", "--source-angle", "20",
+                            "--rounds", "1", "--quality", "draft", "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.err, HasSubstr("lamp blurs 1.2 pixels, diffraction 0.3: "));
+  EXPECT_THAT(made.err, HasSubstr("no lens shows finer detail in this light; --pixels "));
+  const nlohmann::json blur = nlohmann::json::parse(made.out)["blur"];
+  ASSERT_EQ(blur.size(), 2U);
+  EXPECT_EQ(blur[0]["cause"], "lamp");
+  // The angle times the distance, in pixels of 10 mm / 24.
+  EXPECT_NEAR(blur[0]["pixels"].get<double>(), 0.02 * 24.5 * 2.4, 0.02);
+  EXPECT_EQ(blur[1]["cause"], "diffraction");
+  EXPECT_NEAR(blur[1]["pixels"].get<double>(), std::sqrt(550e-6 * 24.5) * 2.4, 0.01);
+}
+
+/// What `cam` judges is in its text, in report.json and on the wall.
+TEST_F(Scenario, APartIsJudgedByWavesUnlessTheLampIsWide) {
+  ASSERT_EQ(
+      run({"design", picture("stripes.png"), "--out", path("lens"), "--pixels", "24", "--width",
+           "10mm", "--focal", "30mm", "--rounds", "1", "--quality", "draft", "--quiet"})
+          .exit_code,
+      0);
+  const auto cut = [&](const Arguments& options) {
+    Arguments arguments{"cam", path("lens"), "--no-rough", "--no-semi", "--no-remedies", "--quiet"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_TRUE(outcome.exit_code == 0 || outcome.exit_code == 3) << outcome.err;
+    return outcome.out;
+  };
+  EXPECT_THAT(cut({}), HasSubstr("Judged by waves. Diffraction blurs"));
+  const nlohmann::json report = nlohmann::json::parse(content(path("lens/cam/report.json")));
+  EXPECT_EQ(report["light"]["model"], "waves");
+  EXPECT_EQ(report["light"]["blur"].size(), 4U);
+  const std::string wall = content(path("lens/cam/wall.png"));
+  EXPECT_NE(wall, content(path("lens/cam/milled.png")));
+  EXPECT_THAT(cut({"--light-model", "rays"}), HasSubstr("Judged by rays, as asked."));
+  EXPECT_EQ(content(path("lens/cam/wall.png")), content(path("lens/cam/milled.png")));
+  expect_refusal(run({"cam", path("lens"), "--light-model", "waves", "--surface", "facet"}), 2,
+                 {"--light-model waves", "creases"});
+}
 
 TEST_F(Scenario, HeightsThatMakeNoFrontAreRefusedInOneLine) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();

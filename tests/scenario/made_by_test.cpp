@@ -27,8 +27,9 @@ class MadeBy : public Scenario {
     return run(arguments);
   }
   Outcome cut(const Arguments& more) const {
-    Arguments arguments = {"cam",        path("lens"),      "--no-rough",    "--no-semi",
-                           "--workshop", path("shop.toml"), "--no-remedies", "--force"};
+    Arguments arguments = {"cam",           path("lens"), "--light-model", "rays",
+                           "--no-rough",    "--no-semi",  "--workshop",    path("shop.toml"),
+                           "--no-remedies", "--force"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }

@@ -53,7 +53,8 @@ class View : public Scenario {
     render_ = read_image(at("lens/render.exr")).image;
   }
   void cut() const {
-    const Outcome made = run({"cam", path("lens"), "--quiet", "--threads", "2", "--no-remedies"});
+    const Outcome made = run({"cam", path("lens"), "--light-model", "rays", "--quiet", "--threads",
+                              "2", "--no-remedies"});
     ASSERT_TRUE(made.exit_code == 0 || made.exit_code == 3) << made.err;
   }
   [[nodiscard]] Outcome page() const {
