@@ -68,7 +68,7 @@ void describe(Description& d, RenderArguments& arguments) {
          "the picture as a wave makes it, beside that of rays: diffraction softens what is finer "
          "than √(λ f); takes seconds");
   d.number("--wavelength", arguments.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength),
-           "NM", "of the wave; white light is as 550");
+           "nm", "of the wave; white light is as 550");
   describe(d, arguments.render);
 }
 

@@ -420,7 +420,7 @@ void describe_prediction(Description& d, CamOptions& o, const Description& shop)
       {{"auto", LightModel::kAuto}, {"rays", LightModel::kRays}, {"waves", LightModel::kWaves}},
       "the picture that is judged, by waves or by rays alone; auto: waves unless the lamp's image "
       "is much wider than diffraction, or the surface has creases");
-  d.number("--wavelength", o.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength), "NM",
+  d.number("--wavelength", o.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength), "nm",
            "of the waves; white light is as 550");
   d.whole("--tolerances", o.tolerances,
           Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
