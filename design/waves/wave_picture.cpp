@@ -42,9 +42,11 @@ constexpr double kEdgeSpread = 11.0;
 constexpr int kEdgePoints = 8;
 
 /// Larger fields are not made: what is steepest in them goes as rays if it is little, or if
-/// quarters of the tile would overlap too little; else the tile is divided.
-constexpr double kMostNodes = 4e6;
-constexpr double kLittle = 0.02;    ///< Share of a tile's light.
+/// quarters of the tile would overlap too little; else the tile is divided. A steep 128² portrait
+/// is 0.0009 (MAE) from its picture with fields of 4e7 nodes and a spread of 11 everywhere, in two
+/// thirds of the time; with 4e6 nodes and 2 % it is 0.002 off, with 1.6e7 0.0005.
+constexpr double kMostNodes = 8e6;
+constexpr double kLittle = 0.005;   ///< Share of a tile's light.
 constexpr double kLeastRamp = 1.0;  ///< In √(λ f).
 
 /// From this share of the steepest direction kept on, waves fade into rays.
