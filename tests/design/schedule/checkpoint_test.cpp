@@ -270,7 +270,11 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
                          {.polish_sigma = 0.02},
                          {.rim_depth = 0.01},
                          {.rim_length = 2.0},
-                         {.polish_spread = 0.1}};
+                         {.polish_spread = 0.1},
+                         {.polish_order = 4},
+                         {.polish_floor = 0.1},
+                         {.roughness = 10.0},
+                         {.roughness = 10.0, .correlation = 4.0}};
   EXPECT_EQ(std::size(made), testing::member_count<MadeBy>() + 1);
   for (const MadeBy& process : made) {
     DesignOptions options;
