@@ -76,11 +76,11 @@ std::vector<PictureBlur> blurs_of(const OpticalSetup& setup, const CamOptions& o
 /// nm, for the light that a roughness which is not stated might scatter.
 constexpr double kExampleRoughness = 10.0;
 
-/// "Haze: 0.31 % of the light within 33 pixels."
+/// "Haze: 0.313 % of the light, spread over 33.1 pixels."
 std::string haze_words(const Haze& haze, const Haze& example) {
   if (!haze.none()) {
     return joined({"Haze: ", percent_text(haze.share), " of the light, spread over ",
-                   decimal_text(haze.width(), 0), " pixels."});
+                   decimal_text(haze.width(), 1), " pixels."});
   }
   return joined({"Haze is not counted, because the polish's roughness is not stated: ",
                  decimal_text(example.roughness.rms, 0), " nm would scatter ",

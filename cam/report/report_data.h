@@ -181,7 +181,7 @@ struct ReportData {
   [[nodiscard]] double minutes() const;
   /// By what the part is judged and why, and what blurs its picture. "Judged by waves. Diffraction
   /// blurs 1.0 pixels, polish 0.4; the widest, diffraction, would be less with a nearer wall. Haze:
-  /// 0.31 % of the light, spread over 33 pixels."
+  /// 0.313 % of the light, spread over 33.1 pixels."
   [[nodiscard]] std::string judged_words() const;
   /// The blurs alone.
   [[nodiscard]] std::string blurs_words() const;

@@ -122,7 +122,7 @@ TEST(CamJob, RoughnessAddsHaze) {
   EXPECT_FALSE(json_of_report(clear)["light"].contains("haze"));
   EXPECT_THAT(without.judged_words(),
               HasSubstr("Haze is not counted, because the polish's roughness is not stated: 10 nm "
-                        "would scatter 0.31 % of the light."));
+                        "would scatter 0.313 % of the light."));
   options.workshop.polish.roughness = 10.0;
   const TempFolder rough;
   const ReportData with = run_cut(small_lens(), options, rough).report;
@@ -132,7 +132,7 @@ TEST(CamJob, RoughnessAddsHaze) {
   EXPECT_GT(haze["width_pixels"].get<double>(), 0.0);
   EXPECT_EQ(haze["roughness_nm"], 10.0);
   EXPECT_EQ(haze["correlation_um"], 5.0);
-  EXPECT_THAT(with.judged_words(), HasSubstr("Haze: 0.31 % of the light, spread over "));
+  EXPECT_THAT(with.judged_words(), HasSubstr("Haze: 0.313 % of the light, spread over "));
   EXPECT_EQ(report["leakage"]["causes"].back()["cause"], "haze");
   EXPECT_EQ(report["leakage"]["causes"].size(), without.leakage.parts.size() + 1);
   double sum = 0.0;

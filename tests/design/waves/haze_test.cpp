@@ -126,7 +126,7 @@ std::vector<double> picture_of(const Roughness& roughness, unsigned seed = 1) {
 /// Light in the ring from `low` to `high` mm around the focus, without the cross that the lens's
 /// sides diffract.
 double ring(const std::vector<double>& picture, double low, double high) {
-  constexpr double kCross = 0.2;
+  constexpr double kCross = 0.12;
   double sum = 0.0;
   for (std::size_t k = 0; k < picture.size(); ++k) {
     const double pixel = kWall / kPixels;
@@ -139,23 +139,23 @@ double ring(const std::vector<double>& picture, double low, double high) {
   return sum;
 }
 
-/// Share and distribution of what a random rough surface scatters as a wave. The rings' 200 to
-/// 700 speckles bound the agreement.
+/// Share and distribution of what two random rough surfaces scatter as waves. The number of waves
+/// and speckles in a ring bounds the agreement.
 TEST(Haze, ARandomSurfaceScattersAsTheModelSays) {
   const std::vector<double> smooth = picture_of({});
   const OpticalSetup setup = focus_setup();
   for (const Roughness& roughness : {Roughness{15.0, 20.0}, {30.0, 30.0}}) {
     const Haze haze = haze_of(roughness, setup, kHeight, kWavelength);
     const std::vector<double> model = hazed(haze, smooth, setup.pixels, Executor::serial());
-    const std::vector<double> wave = picture_of(roughness);
+    std::vector<double> wave = picture_of(roughness, 1);
+    const std::vector<double> other = picture_of(roughness, 2);
+    for (std::size_t k = 0; k < wave.size(); ++k) wave[k] = 0.5 * (wave[k] + other[k]);
     const double sigma = haze.deviation.x() * kWall / kPixels;
     const double diffracted = ring(smooth, 0.0, kWall);
-    EXPECT_LT(diffracted, 0.05 * haze.share);
+    EXPECT_LT(diffracted, 0.1 * haze.share);
     const auto compare = [&](double low, double high) {
       const double expected = ring(model, low * sigma, high * sigma);
       const double measured = ring(wave, low * sigma, high * sigma);
-      std::printf("%g nm: S %.5f, ring %g to %g sigma: model %.6f, wave %.6f\n", roughness.rms,
-                  haze.share, low, high, expected, measured);
       EXPECT_NEAR(measured, expected, 0.1 * expected) << low << ' ' << high;
     };
     compare(0.0, 9.0);
