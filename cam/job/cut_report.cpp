@@ -577,7 +577,8 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
   data.light_words = prediction.light_words;
   data.blurs = prediction.blurs;
   if (const Haze& haze = prediction.haze; !haze.none()) {
-    data.haze = ReportHaze{haze.share, haze.width(), haze.roughness.rms, haze.roughness.correlation};
+    data.haze =
+        ReportHaze{haze.share, haze.width(), haze.roughness.rms, haze.roughness.correlation};
   }
   data.haze_words = prediction.haze_words;
   if (traits(data.body).transmits) data.ghost = ghost_share(lens.setup.ior);
