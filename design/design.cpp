@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "core/io/checkpoint_file.h"
 #include "core/lens/surface_check.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/polish_transfer.h"
 #include "core/spline/control_net.h"
 #include "design/render.h"
 #include "design/render/source_picture.h"
@@ -22,6 +24,7 @@
 #include "design/schedule/levels.h"
 #include "design/schedule/rounds.h"
 #include "design/spline/made_surface.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 namespace {
@@ -65,6 +68,21 @@ Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Execut
   return lens;
 }
 
+/// Adds the haze of a part's roughness to its picture.
+void add_haze(const Roughness& roughness, const Lens& lens, DesignResult::Made& made,
+              const Executor& executor) {
+  if (roughness.none()) return;
+  const double height = lens.surface.vertices.row(2).mean();
+  const Haze haze = haze_of(roughness, lens.setup, height, middle_wavelength(lens.setup));
+  const std::span<float> values = made.picture.values();
+  const std::vector<double> clear(values.begin(), values.end());
+  const std::vector<double> picture = hazed(haze, clear, lens.setup.pixels, executor);
+  std::transform(picture.begin(), picture.end(), values.begin(),
+                 [](double value) { return static_cast<float>(value); });
+  made.metrics = compare(made.picture, lens.target);
+  made.metrics.flux_inside = made.picture.total() / lens.target.total();
+}
+
 /// Predicts the part by the design's own model of cutting and polishing.
 std::optional<DesignResult::Made> made_part(const DesignOptions& options, const Lens& lens,
                                             const Executor& executor) {
@@ -74,6 +92,7 @@ std::optional<DesignResult::Made> made_part(const DesignOptions& options, const 
   DesignResult::Made made;
   made.metrics =
       evaluate(part.mesh, part.normals, lens.setup, lens.target, &made.picture, executor);
+  add_haze({options.made_by->roughness, options.made_by->correlation}, lens, made, executor);
   return made;
 }
 

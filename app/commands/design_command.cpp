@@ -76,7 +76,9 @@ MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
                     shop.polish.rim_length,
                     settings.robust ? shop.tolerances.polish_sigma : 0.0,
                     shop.polish.order,
-                    shop.polish.floor};
+                    shop.polish.floor,
+                    shop.polish.roughness,
+                    shop.polish.correlation};
   return cut.part == PartKind::kMould ? made.cast(cut.shrinkage) : made;
 }
 
@@ -406,6 +408,8 @@ nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) 
           {"polish_sigma_mm", process.polish_sigma},
           {"polish_order", process.polish_order},
           {"polish_floor", process.polish_floor},
+          {"roughness_nm", process.roughness},
+          {"correlation_um", process.correlation},
           {"rim_depth_mm", process.rim_depth},
           {"rim_length_mm", process.rim_length},
           {"polish_spread", process.polish_spread},

@@ -347,6 +347,11 @@ ParameterGroup polish_parameters(const CutSetup& setup) {
   if (polish.floor > 0.0) {
     group.parameters.push_back({"Left of every ripple", percent_text(polish.floor)});
   }
+  if (polish.roughness > 0.0) {
+    group.parameters.push_back(
+        {"Roughness", joined({trimmed_decimal(polish.roughness, 2), " nm rms over ",
+                              trimmed_decimal(polish.correlation, 2), " µm"})});
+  }
   if (polish.rim_depth > 0.0) {
     group.parameters.push_back(
         {"Taken off at the rim", mm(options.workshop.polish.rim_depth, 4) + ", falling over " +
@@ -571,6 +576,11 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
   data.waves = prediction.waves;
   data.light_words = prediction.light_words;
   data.blurs = prediction.blurs;
+  if (const Haze& haze = prediction.haze; !haze.none()) {
+    data.haze =
+        ReportHaze{haze.share, haze.width(), haze.roughness.rms, haze.roughness.correlation};
+  }
+  data.haze_words = prediction.haze_words;
   if (traits(data.body).transmits) data.ghost = ghost_share(lens.setup.ior);
   data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},

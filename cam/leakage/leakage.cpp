@@ -18,6 +18,7 @@
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/polish_transfer.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 #include "design/flux/flux_image.h"
@@ -218,9 +219,35 @@ void require_pixels(const Image& target, const OpticalSetup& optics) {
            std::to_string(target.columns()) + "x" + std::to_string(target.rows()));
 }
 
+FluxPicture with_haze(const Haze* haze, FluxPicture picture, const Executor& executor) {
+  if (haze == nullptr) return picture;
+  picture.flux = hazed(*haze, picture.flux, {picture.columns, picture.rows}, executor);
+  return picture;
+}
+
+/// Adds the step of the haze, which is also on the part where that is among the other surfaces.
+void add_haze(const LeakageChain& chain, const PictureJudge& judge, const Executor& executor,
+              LeakageResult& result) {
+  if (chain.haze == nullptr || chain.haze->none()) return;
+  RenderedSurface part{
+      leak_cause::kHaze, with_haze(chain.haze, result.part().picture, executor), {}};
+  part.quality = judge.judge(part.picture);
+  for (const NamedSurface& other : chain.others) {
+    if (other.field != chain.part().field) continue;
+    const auto shown = std::find_if(
+        result.others.begin(), result.others.end(),
+        [&other](const RenderedSurface& surface) { return surface.name == other.name; });
+    if (shown == result.others.end()) continue;
+    shown->picture = part.picture;
+    shown->quality = part.quality;
+  }
+  result.steps.push_back(std::move(part));
+  result.hazed = true;
+}
+
 /// Judges the pictures of a chain; other surfaces without a picture are left out.
 LeakageResult judged(const LeakageChain& chain, const ChainPictures& pictures,
-                     const PictureJudge& judge) {
+                     const PictureJudge& judge, const Executor& executor) {
   LeakageResult result;
   const auto rendered = [&](const NamedSurface& surface) {
     RenderedSurface one{surface.name, pictures.at(surface.field), {}};
@@ -232,6 +259,7 @@ LeakageResult judged(const LeakageChain& chain, const ChainPictures& pictures,
   for (const NamedSurface& other : chain.others) {
     if (pictures.contains(other.field)) result.others.push_back(rendered(other));
   }
+  add_haze(chain, judge, executor, result);
   result.dark = judge.dark();
   result.dark_pixels = judge.dark_pixels();
   result.bright_pixels = judge.bright_pixels();
@@ -249,7 +277,7 @@ LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
   const ChainPictures pictures = pictures_by_rays(chain, setup, executor, control);
   const FluxPicture& designed = pictures.at(chain.designed.field);
   const PictureJudge judge(target, designed, options);
-  LeakageResult result = judged(chain, pictures, judge);
+  LeakageResult result = judged(chain, pictures, judge, executor);
   if (!setup.optics.extent.none()) {
     result.point = point_light(chain.designed, designed, setup, judge, executor, control);
   }
@@ -283,7 +311,8 @@ WaveLeakage measure_waves(const LeakageChain& chain, const RenderedSurface& rays
   waves.scatter = scatter;
   const ChainPictures pictures = pictures_by_waves(chain, setup, waves, executor, control);
   const FluxPicture& designed = pictures.at(chain.designed.field);
-  WaveLeakage measured{judged(chain, pictures, PictureJudge(target, designed, options)), wavelength,
+  const PictureJudge judge(target, designed, options);
+  WaveLeakage measured{judged(chain, pictures, judge, executor), wavelength,
                        diffraction_width(setup.optics, setup.surface_height, wavelength)};
   measured.result.rays = rays;
   measured.result.parts = parts_of(measured.result);
@@ -358,7 +387,8 @@ SamplingCheck check_sampling(const LeakageChain& chain, const LeakageResult& res
     return picture;
   };
   const FluxPicture& before = result.part().picture;
-  const FluxPicture now = with_fine_windows(*chain.part().field, before);
+  const FluxPicture now = with_haze(
+      chain.haze, with_fine_windows(*chain.part().field, result.clear_part().picture), executor);
   const FluxPicture& design_before = result.designed.picture;
   const FluxPicture design_now = with_fine_windows(*chain.designed.field, design_before);
   double cells = 0.0;
@@ -497,7 +527,7 @@ class PlaceStudy {
         setup_(setup),
         executor_(executor),
         dark_(result.dark),
-        more_(pixels_with_surplus(result.part().picture, result.designed.picture)) {}
+        more_(pixels_with_surplus(result.clear_part().picture, result.designed.picture)) {}
 
   LeakPlace study(const LeakMap& map, const CellRange& square) const {
     LeakPlace place;

@@ -16,6 +16,7 @@
 namespace lensforge {
 
 struct FieldRenderSetup;
+struct Haze;
 
 /// Limits of a target's dark and bright pixels, as shares of its mean.
 struct LeakageOptions {
@@ -98,6 +99,7 @@ inline constexpr const char* kChord = "chord";
 inline constexpr const char* kDecimals = "decimals";
 inline constexpr const char* kPitchError = "pitch error";  ///< If the workshop states one.
 inline constexpr const char* kPath = "path";  ///< By waves: chords, decimals and pitch error.
+inline constexpr const char* kHaze = "haze";  ///< Behind the chain, if the workshop states it.
 }  // namespace leak_cause
 
 /// Called for every sampled tile of a surface; the patch includes one more node around it where
@@ -112,6 +114,7 @@ struct LeakageChain {
   std::vector<NamedSurface> steps;   ///< Named after the added cause; the last is the part.
   std::vector<NamedSurface> others;  ///< Only rendered and compared.
   TileObserver observe = {};         ///< Sees the tiles of those without a grid of their own.
+  const Haze* haze = nullptr;        ///< Of the part's picture: the last cause, if there is any.
 
   [[nodiscard]] const NamedSurface& part() const { return steps.back(); }
 };
@@ -146,8 +149,10 @@ struct LeakageResult {
   RenderedSurface designed;
   std::optional<PointLight> point;      ///< By rays, where the source is extended.
   std::optional<RenderedSurface> rays;  ///< By waves: the designed surface by rays.
-  std::vector<RenderedSurface> steps;   ///< As LeakageChain::steps; the last is the part.
+  /// As LeakageChain::steps, and the part with its haze where there is any; the last is the part.
+  std::vector<RenderedSurface> steps;
   std::vector<RenderedSurface> others;
+  bool hazed = false;  ///< True if the last step is that of the haze.
   /// The source's, where it is extended, or by waves that of diffraction; then one per step.
   std::vector<CausePart> parts;
   std::vector<double> dark;      ///< 1 for dark pixels, 0 for others, row by row from the top.
@@ -155,12 +160,16 @@ struct LeakageResult {
   std::int64_t bright_pixels = 0;
 
   [[nodiscard]] const RenderedSurface& part() const { return steps.back(); }
+  /// The part without its haze: what the surface's places send where.
+  [[nodiscard]] const RenderedSurface& clear_part() const {
+    return hazed ? steps[steps.size() - 2] : steps.back();
+  }
 };
 
 /// Renders every surface of a chain and splits the leakage by cause. A surface that occurs in the
 /// chain more than once (the same object) is rendered once. With an extended source the designed
 /// surface is also rendered in the light of a point: the additional light in the dark pixels is the
-/// source's part.
+/// source's part. Haze is added to the part's picture, also among the other surfaces.
 /// @pre the chain has a designed surface and at least one step; target has the setup's pixels.
 /// @throw InputError if dark_below and bright_from break their rules; Interrupted.
 LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
@@ -298,7 +307,8 @@ struct LeakPlace {
 };
 
 /// The places that leak most, worst first, at least a square's side apart. `map` gives the places,
-/// the chain the causes. @throw Interrupted as the executor does.
+/// the chain the causes, haze not among them: it scatters light of every place alike. @throw
+/// Interrupted as the executor does.
 std::vector<LeakPlace> worst_places(const LeakMap& map, const LeakageChain& chain,
                                     const LeakageResult& result, const FieldRenderSetup& setup,
                                     const LeakPlaceOptions& options, const Executor& executor);

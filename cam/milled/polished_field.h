@@ -19,6 +19,11 @@ inline double rim_loss(const PolishModel& model, double distance) {
   return model.rim_depth * std::exp(-std::max(distance, 0.0) / model.rim_length);
 }
 
+/// What is finer than a ripple.
+inline Roughness roughness_of(const PolishModel& model) {
+  return {model.roughness, model.correlation};
+}
+
 /// Share of a ripple that a polish leaves, by its wave number.
 inline PolishTransfer transfer_of(const PolishModel& model) {
   return {model.sigma, model.order, model.floor};

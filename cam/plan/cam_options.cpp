@@ -436,6 +436,10 @@ void describe_prediction(Description& d, CamOptions& o, const Description& shop)
       "2: pads and wheels, an average with a Gaussian of σ; 4: a levelling film, flame and vapour");
   d.like(shop.at("polish.floor"), "--polish-floor",
          "share of every ripple that polishing leaves however narrow it is");
+  d.like(shop.at("polish.roughness"), "--roughness",
+         "rms roughness that polishing leaves, which scatters light; 0: haze is not counted");
+  d.like(shop.at("polish.correlation"), "--correlation",
+         "correlation length of the roughness: a shorter one scatters farther");
   d.like(shop.at("polish.rim_depth"), "--rim-depth",
          "extra depth that polishing removes at the rim");
   d.like(shop.at("polish.rim_length"), "--rim-length",

@@ -73,6 +73,20 @@ std::vector<PictureBlur> blurs_of(const OpticalSetup& setup, const CamOptions& o
   return blurs;
 }
 
+/// nm, for the light that a roughness which is not stated might scatter.
+constexpr double kExampleRoughness = 10.0;
+
+/// "Haze: 0.313 % of the light, spread over 33.1 pixels."
+std::string haze_words(const Haze& haze, const Haze& example) {
+  if (!haze.none()) {
+    return joined({"Haze: ", percent_text(haze.share), " of the light, spread over ",
+                   decimal_text(haze.width(), 1), " pixels."});
+  }
+  return joined({"Haze is not counted, because the polish's roughness is not stated: ",
+                 decimal_text(example.roughness.rms, 0), " nm would scatter ",
+                 percent_text(example.share), " of the light."});
+}
+
 /// Samples a whole surface coarsely.
 SurfacePatch coarse_patch(const SurfaceField& field, const Lens& lens, double spacing,
                           const Executor& executor) {
@@ -136,19 +150,30 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
     layers.take(field, patch, executor);
     if (&field == &surfaces.rounded()) creases.add(tile, patch, executor);
   };
-  result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   const double wavelength = middle_wavelength(lens.setup, kMmPerNm * options.wavelength_nm);
+  const Roughness roughness = roughness_of(options.workshop.polish);
+  const auto haze = [&](const Roughness& rough) {
+    return haze_of(rough, lens.setup, setup.surface_height, wavelength);
+  };
+  result.haze = haze(roughness);
+  chain.haze = &result.haze;
+  result.haze_words = haze_words(result.haze, haze({kExampleRoughness, roughness.correlation}));
+  result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   const LightChoice light = light_choice(setup, options.light, creased, wavelength);
   result.light_words = light.words;
   result.blurs = blurs_of(lens.setup, options, passes, setup.surface_height, wavelength);
   if (light.waves) {
-    result.waves = measure_waves(surfaces.short_chain(), result.leakage.designed, lens.target,
-                                 setup, options.leakage, wavelength,
-                                 kOrderWidth * wavelength / passes.pitch, executor, control);
+    LeakageChain by_waves = surfaces.short_chain();
+    by_waves.haze = &result.haze;
+    result.waves =
+        measure_waves(by_waves, result.leakage.designed, lens.target, setup, options.leakage,
+                      wavelength, kOrderWidth * wavelength / passes.pitch, executor, control);
   }
   result.sampling = check_sampling(chain, result.leakage, lens.target, setup, executor, control);
+  // Places and remedies are those of the surface. Haze is no place's: with it the map's total would
+  // be less than the leakage, and pixels that it alone lights would count light of good places.
   const std::vector<double> weights =
-      pixels_with_surplus(result.leakage.part().picture, result.leakage.designed.picture);
+      pixels_with_surplus(result.leakage.clear_part().picture, result.leakage.designed.picture);
   const LeakMap map =
       map_leakage(chain.designed, chain.part(), setup, weights, kLeakCell, executor);
   result.places = worst_places(map, chain, result.leakage, setup, {}, executor);
@@ -254,7 +279,7 @@ struct Exchange {
 
 Exchange exchange(const LeakageResult& predicted, const FluxPicture& before,
                   const FluxPicture& now) {
-  const std::vector<double>& part = predicted.part().picture.flux;
+  const std::vector<double>& part = predicted.clear_part().picture.flux;
   const std::vector<double>& designed = predicted.designed.picture.flux;
   Exchange sum;
   for (std::size_t i = 0; i < part.size(); ++i) {
@@ -549,25 +574,26 @@ void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const E
 namespace {
 
 /// Nominal values that a cut's programs assume.
-PartPlan part_plan(const CutSetup& setup) {
+PartPlan part_plan(const CutSetup& setup, const Haze& haze) {
   const Workshop& shop = setup.options.workshop;
-  return {setup.lens->setup, setup.passes(), shop.polish,
-          shop.polish.sigma * (1.0 + kSigmaBound * shop.tolerances.polish_sigma),
-          setup.apron_on_lens()};
+  return {
+      setup.lens->setup,     setup.passes(),
+      shop.polish,           shop.polish.sigma * (1.0 + kSigmaBound * shop.tolerances.polish_sigma),
+      setup.apron_on_lens(), haze};
 }
 
 /// Draws CamOptions::tolerances parts with the workshop's errors and predicts them.
-/// @param designed  picture of the design. @throw Interrupted
+/// @throw Interrupted
 ToleranceForecast draw_parts(const CutSetup& setup, const PartSurfaces& surfaces,
-                             const FluxPicture& designed, const Executor& executor,
+                             const Prediction& prediction, const Executor& executor,
                              const RunControl& control) {
   const CamOptions& options = setup.options;
   const Lens& lens = *setup.lens;
-  const PartPlan plan = part_plan(setup);
+  const PartPlan plan = part_plan(setup, prediction.haze);
   const PartModel model(surfaces.milled(), plan, executor, control);
   const ErrorSource source{options.workshop.tolerances, lens.setup.lens_size, plan.passes,
                            static_cast<std::uint64_t>(options.tolerance_seed)};
-  const PictureJudge judge(lens.target, designed, options.leakage);
+  const PictureJudge judge(lens.target, prediction.leakage.designed.picture, options.leakage);
   return forecast_parts(model, source, judge, options.tolerances, executor, control);
 }
 
@@ -584,8 +610,7 @@ Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const Cut
                  control);
   }
   if (options.tolerances > 0) {
-    prediction.tolerances =
-        draw_parts(setup, surfaces, prediction.leakage.designed.picture, executor, control);
+    prediction.tolerances = draw_parts(setup, surfaces, prediction, executor, control);
   }
   return prediction;
 }

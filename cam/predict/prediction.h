@@ -24,6 +24,7 @@
 #include "core/lens/surface_field.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/polish_transfer.h"
 
 namespace lensforge {
 
@@ -33,6 +34,8 @@ struct Prediction {
   std::optional<WaveLeakage> waves;  ///< Where the light model asks for them.
   std::string light_words;           ///< By what the part is judged, and why.
   std::vector<PictureBlur> blurs;    ///< Of light and part.
+  Haze haze;                         ///< Of the part; none where its roughness is not stated.
+  std::string haze_words;            ///< What it scatters, or that it is not counted.
   SamplingCheck sampling;            ///< Of the part.
   std::vector<LeakPlace> places;     ///< Places that leak most, worst first.
   CreaseMap creases;

@@ -67,12 +67,15 @@ void PathSketch::thin_out() {
 }
 
 std::string ReportData::judged_words() const {
-  const std::string words = "Judged " + light_words + ".";
-  if (blurs.empty()) return words;
+  std::string words = joined({"Judged ", light_words, "."});
+  if (!blurs.empty()) words = joined({words, " ", blurs_words()});
+  return haze_words.empty() ? words : joined({words, " ", haze_words});
+}
+
+std::string ReportData::blurs_words() const {
   const std::string blur = blur_words(blurs);
   const std::string sentence =
-      words + " " + static_cast<char>(std::toupper(static_cast<unsigned char>(blur.front()))) +
-      blur.substr(1);
+      static_cast<char>(std::toupper(static_cast<unsigned char>(blur.front()))) + blur.substr(1);
   const PictureBlur& most = widest(blurs);
   if (most.pixels < kNoBlur) return sentence + ".";
   return joined({sentence, "; the widest, ", most.cause, ", would be less with ",

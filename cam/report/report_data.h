@@ -131,6 +131,14 @@ struct ShownSurface {
   std::string words;  ///< A few words about it.
 };
 
+/// What a part's roughness scatters.
+struct ReportHaze {
+  double share = 0.0;        ///< Haze::share
+  double width = 0.0;        ///< Haze::width(), pixels.
+  double roughness = 0.0;    ///< nm, rms.
+  double correlation = 0.0;  ///< µm
+};
+
 /// All contents of report.html and report.json.
 struct ReportData {
   std::string job;      ///< Name of the part.
@@ -143,6 +151,8 @@ struct ReportData {
   std::optional<WaveLeakage> waves;  ///< By waves: designed and chain.
   std::string light_words;           ///< By what the part is judged, and why.
   std::vector<PictureBlur> blurs;    ///< Of light and part, the light's first.
+  std::optional<ReportHaze> haze;    ///< Of the part, where its roughness is stated.
+  std::string haze_words;            ///< What it scatters, or that it is not counted.
   SamplingCheck sampling;            ///< Of the part.
   std::vector<ShownSurface> shown;   ///< Their pictures are shown side by side.
   LeakageOptions leakage_options;
@@ -170,8 +180,11 @@ struct ReportData {
 
   [[nodiscard]] double minutes() const;
   /// By what the part is judged and why, and what blurs its picture. "Judged by waves. Diffraction
-  /// blurs 1.0 pixels, polish 0.4; the widest, diffraction, would be less with a nearer wall."
+  /// blurs 1.0 pixels, polish 0.4; the widest, diffraction, would be less with a nearer wall. Haze:
+  /// 0.313 % of the light, spread over 33.1 pixels."
   [[nodiscard]] std::string judged_words() const;
+  /// The blurs alone.
+  [[nodiscard]] std::string blurs_words() const;
   /// By what the part is judged.
   [[nodiscard]] const LeakageResult& judged() const { return waves ? waves->result : leakage; }
   /// The lit part: "lens", or the cast from the mould.

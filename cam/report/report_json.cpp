@@ -82,6 +82,13 @@ json leakage_json(const ReportData& data, const LeakageResult& result) {
   return object;
 }
 
+json haze_json(const ReportHaze& haze) {
+  return {{"share", haze.share},
+          {"width_pixels", haze.width},
+          {"roughness_nm", haze.roughness},
+          {"correlation_um", haze.correlation}};
+}
+
 json sampling_json(const SamplingCheck& check) {
   return {
       {"spacing_mm", check.spacing}, {"leakage_error", check.leakage}, {"mae_error", check.mae}};
@@ -268,6 +275,7 @@ json report_json(const ReportData& data) {
     report["light"] = {{"model", data.waves ? "waves" : "rays"},
                        {"words", data.light_words},
                        {"blur", list(data.blurs, blur)}};
+    if (data.haze) report["light"]["haze"] = haze_json(*data.haze);
     if (data.waves) {
       report["waves"] = {{"wavelength_nm", kNmPerMm * data.waves->wavelength},
                          {"diffraction_mm", data.waves->width},

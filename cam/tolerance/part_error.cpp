@@ -155,6 +155,7 @@ PartError ErrorSource::draw(std::uint64_t part, const ErrorScales& scales) const
   error.sigma_factor = 1.0 + polish_scale * t.polish_sigma * bounded_normal(polish);
   error.sigma_within = polish_scale * t.polish_within;
   error.sigma_waves = draw_polish_waves(lens_size.maxCoeff(), polish);
+  error.roughness_factor = 1.0 + polish_scale * t.roughness * bounded_normal(polish);
   const double kelvin = scale_of(ErrorCause::kTemperature) * t.temperature_k *
                         random_of(ErrorCause::kTemperature).even();
   error.expansion = t.expansion_per_k * kelvin;

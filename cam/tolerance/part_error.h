@@ -78,6 +78,7 @@ struct PartError {
   double sigma_factor = 1.0;           ///< Of the polish's σ, everywhere.
   double sigma_within = 0.0;           ///< Relative standard deviation of that from place to place.
   std::vector<PlaneWave> sigma_waves;  ///< Its pattern; their sum has the variance count / 2.
+  double roughness_factor = 1.0;       ///< Of the polish's roughness.
   double index = 0.0;                  ///< Excess over the design's, including temperature.
   double distance = 0.0;               ///< Additional, to the screen, mm.
   Eigen::Vector2d tilt{0.0, 0.0};      ///< About x and y, rad.

@@ -729,6 +729,14 @@ PartModel::PartModel(const SurfaceField& cut, const PartPlan& plan, const Execut
       lit_(light_nodes(base_)) {}
 
 FluxPicture PartModel::render(const PartError& error, const Executor& executor) const {
+  FluxPicture picture = clear(error, executor);
+  const Haze haze = plan_.haze.times(error.roughness_factor);
+  picture.flux = hazed(haze, picture.flux, plan_.optics.pixels, executor);
+  return picture;
+}
+
+/// The picture without haze.
+FluxPicture PartModel::clear(const PartError& error, const Executor& executor) const {
   const Passes& passes = plan_.passes;
   const double sigma = std::min(plan_.polish.sigma * error.sigma_factor, plan_.largest_sigma);
   const PolishTransfer polish{sigma, plan_.polish.order, plan_.polish.floor};

@@ -101,6 +101,7 @@ struct PartPlan {
   PolishModel polish;
   double largest_sigma = 0.0;  ///< Of the polish, with errors, mm, ≥ polish.sigma.
   double apron = 0.0;  ///< Distance beyond the lens's rim up to which the surface is cut, mm.
+  Haze haze = {};      ///< Of the nominal part.
 };
 
 /// Predicts the pictures of many parts with errors from one sampling of the surface as cut.
@@ -116,12 +117,15 @@ class PartModel {
   PartModel(const SurfaceField& cut, const PartPlan& plan, const Executor& executor,
             const RunControl& control);
 
-  /// The picture of one part; same bits for any number of threads. @throw Interrupted
+  /// The picture of one part, with its haze; same bits for any number of threads. @throw
+  /// Interrupted
   [[nodiscard]] FluxPicture render(const PartError& error, const Executor& executor) const;
 
   [[nodiscard]] const PartPlan& plan() const { return plan_; }
 
  private:
+  [[nodiscard]] FluxPicture clear(const PartError& error, const Executor& executor) const;
+
   PartPlan plan_;
   BaseHeights base_;
   double mean_height_;  ///< mm

@@ -119,11 +119,13 @@ double max_pitch(const FinishProcess& process, double ball_radius, double steepe
 
 /// Model of polishing; all lengths in mm.
 struct PolishModel {
-  double sigma = 0.0;       ///< Of the transfer function, ≥ 0; 0: not polished.
-  double rim_depth = 0.0;   ///< Additional removal at the rim, ≥ 0.
-  double rim_length = 1.0;  ///< Distance over which that falls to 1/e, > 0.
-  int order = 2;            ///< Of the transfer function (PolishTransfer): 2 or 4.
-  double floor = 0.0;       ///< Share of every ripple that stays, in [0, 1).
+  double sigma = 0.0;        ///< Of the transfer function, ≥ 0; 0: not polished.
+  double rim_depth = 0.0;    ///< Additional removal at the rim, ≥ 0.
+  double rim_length = 1.0;   ///< Distance over which that falls to 1/e, > 0.
+  int order = 2;             ///< Of the transfer function (PolishTransfer): 2 or 4.
+  double floor = 0.0;        ///< Share of every ripple that stays, in [0, 1).
+  double roughness = 0.0;    ///< Roughness::rms, nm, ≥ 0; 0: not stated.
+  double correlation = 5.0;  ///< Roughness::correlation, µm, > 0.
 
   friend bool operator==(const PolishModel&, const PolishModel&) = default;
 };
@@ -152,6 +154,7 @@ struct Tolerances {
 
   double polish_sigma = 0.1;    ///< Relative σ of the polish's σ from part to part, 0 … 0.3.
   double polish_within = 0.05;  ///< The same from place to place on a part, 0 … 0.3.
+  double roughness = 0.0;       ///< Relative σ of the polish's roughness, part to part, 0 … 0.3.
 
   double index = 0.001;   ///< Refractive index, ± this, ≥ 0.
   double distance = 1.0;  ///< Of the screen, ± this, mm, ≥ 0.

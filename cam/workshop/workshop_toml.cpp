@@ -36,6 +36,11 @@ constexpr double kMaxPolish = 1.0;
 /// Share of a ripple that stays; with more there is hardly a polish.
 constexpr double kMaxFloor = 0.99;
 
+/// nm, beyond which no light is left that is not scattered; and µm, beyond which it stays in its
+/// pixel.
+constexpr double kMaxRoughness = 1000.0;
+constexpr double kMaxCorrelation = 1000.0;
+
 /// mm; shorter waves are finer than the rows.
 constexpr double kShortestWave = 0.2;
 /// µm; beyond it errors are no longer small against the ball.
@@ -195,6 +200,11 @@ void describe(Description& d, PolishModel& polish) {
           "vapour");
   d.number("floor", polish.floor, {0.0, kMaxFloor}, "",
            "share of every ripple that stays, as pads bridge valleys");
+  d.number("roughness", polish.roughness, {0.0, kMaxRoughness}, "nm",
+           "nm, rms, of what is finer than the ripples and scatters light; 0: not known, haze is "
+           "not counted");
+  d.number("correlation", polish.correlation, Limits::above(0.0, kMaxCorrelation), "µm",
+           "µm, correlation length of the roughness, to 1/e");
   d.length("rim_depth", polish.rim_depth, {0.0, kMaxPolish}, "mm taken off in addition at the rim");
   d.length("rim_length", polish.rim_length, {1e-3, 1000.0},
            "mm from the rim over which that falls to a third");
@@ -220,6 +230,8 @@ void describe(Description& d, Tolerances& t) {
   d.number("polish_sigma", t.polish_sigma, {0.0, kMaxPolishSpread}, "",
            "share of the polish's sigma, from part to part, sigma");
   d.number("polish_within", t.polish_within, {0.0, kMaxPolishSpread}, "", "the same over one part");
+  d.number("roughness", t.roughness, {0.0, kMaxPolishSpread}, "",
+           "share of the polish's roughness, from part to part, sigma");
   d.number("index", t.index, {0.0, 0.1}, "", "refractive index, +- this");
   d.length("distance", t.distance, {0.0, kBlank}, "mm, distance of the screen, +- this");
   d.number("tilt_deg", t.tilt_deg, {0.0, 10.0}, "degrees",

@@ -9,6 +9,9 @@
 #include <numbers>
 #include <numeric>
 
+#include "core/optics/light_path.h"
+#include "core/optics/optical_setup.h"
+
 namespace lensforge {
 namespace {
 
@@ -86,6 +89,122 @@ const std::vector<LineTerm>& film_over_gaussian_terms() {
   static const std::vector<LineTerm> terms =
       terms_of(6, [](double square) { return std::exp(0.5 * square - 0.25 * square * square); });
   return terms;
+}
+
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kMmPerNm = 1e-6;
+constexpr double kMmPerMicrometre = 1e-3;
+
+/// Full width at half maximum of a Gaussian, in its standard deviations: 2 √(2 ln 2).
+constexpr double kFullWidth = 2.3548200450309493;
+
+/// Standard deviations after which a Gaussian ends: 2e-9 of it lie beyond.
+constexpr double kGaussianReach = 6.0;
+
+/// Pixels; of light that is scattered farther at most 1e-6 comes back to a picture of 256 pixels,
+/// and the differences below keep six digits.
+constexpr double kWidestHaze = 1e5;
+
+/// Change of the optical path per height in the lens's middle, for the ray to the picture's: the
+/// length of the step from the ray before the surface to that behind it, times their indices.
+double path_per_height(const OpticalSetup& setup, const Eigen::Vector3d& middle) {
+  const LightPath light(setup);
+  const Eigen::Vector2d slope = light.gradient_for(middle, 0.5 * setup.pixels.cast<double>());
+  const Eigen::Vector3d normal = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
+  return std::abs(light.beam(middle, normal).k);
+}
+
+/// Second antiderivative of a Gaussian of standard deviation 1.
+double twice_integrated(double x) {
+  return 0.5 * x * (1.0 + std::erf(x / std::numbers::sqrt2)) +
+         std::exp(-0.5 * x * x) / std::sqrt(2.0 * kPi);
+}
+
+/// Shares of a pixel's evenly spread light that a Gaussian moves to the pixels 0, 1, 2 … from it
+/// to one side, at most `count` of them.
+std::vector<double> moved_shares(double deviation, int count) {
+  if (deviation == 0.0) return {1.0};
+  const double sigma = std::min(deviation, kWidestHaze);
+  const double reach = std::ceil(kGaussianReach * sigma) + 1.0;
+  std::vector<double> shares(static_cast<std::size_t>(std::min(reach + 1.0, 1.0 * count)));
+  const auto integral = [sigma](double pixels) { return sigma * twice_integrated(pixels / sigma); };
+  // To the left of the middle the antiderivative is small, and so is its rounding.
+  for (std::size_t d = 0; d < shares.size(); ++d) {
+    const double x = -static_cast<double>(d);
+    shares[d] = integral(x + 1.0) - 2.0 * integral(x) + integral(x - 1.0);
+  }
+  return shares;
+}
+
+/// Convolves along one axis: `count` lines of `length` pixels, which are `step` apart, from lines
+/// `apart`.
+struct LineBlur {
+  std::int64_t count, apart, length, step;
+
+  void apply(const std::vector<double>& shares, const std::vector<double>& from,
+             std::vector<double>& to, const Executor& executor) const {
+    const auto blur_line = [&](std::int64_t line) {
+      const auto at = [&](std::int64_t i) {
+        return static_cast<std::size_t>(line * apart + i * step);
+      };
+      const auto reach = static_cast<std::int64_t>(shares.size()) - 1;
+      for (std::int64_t i = 0; i < length; ++i) {
+        double sum = 0.0;
+        const std::int64_t end = std::min(length - 1, i + reach);
+        for (std::int64_t k = std::max<std::int64_t>(0, i - reach); k <= end; ++k) {
+          sum += shares[static_cast<std::size_t>(std::abs(i - k))] * from[at(k)];
+        }
+        to[at(i)] = sum;
+      }
+    };
+    parallel_for(executor, "haze", count, blur_line, 4);
+  }
+};
+
+}  // namespace
+
+double Haze::width() const { return kFullWidth * deviation.maxCoeff(); }
+
+Haze Haze::times(double factor) const {
+  Haze other = *this;
+  other.roughness.rms *= factor;
+  other.share = -std::expm1(factor * factor * std::log1p(-share));
+  return other;
+}
+
+Haze haze_of(const Roughness& roughness, const OpticalSetup& setup, double z, double wavelength) {
+  Haze haze{.roughness = roughness};
+  if (roughness.none()) return haze;
+  const OpticalSetup lit = setup.spectrum.none() ? setup : in_color(setup, wavelength / kMmPerNm);
+  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), z);
+  const double phase =
+      2.0 * kPi * kMmPerNm * roughness.rms * path_per_height(lit, middle) / wavelength;
+  haze.share = -std::expm1(-phase * phase);
+  const double spread =
+      wavelength / (std::numbers::sqrt2 * kPi * kMmPerMicrometre * roughness.correlation);
+  const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
+  haze.deviation = LightPath(lit).clearance(middle) * spread * pixel.cwiseInverse();
+  return haze;
+}
+
+std::vector<double> hazed(const Haze& haze, std::span<const double> flux,
+                          const Eigen::Vector2i& pixels, const Executor& executor) {
+  std::vector<double> picture(flux.begin(), flux.end());
+  if (haze.none()) return picture;
+  const std::int64_t columns = pixels.x();
+  const std::int64_t rows = pixels.y();
+  std::vector<double> by_row(picture.size());
+  std::vector<double> scattered(picture.size());
+  LineBlur{rows, columns, columns, 1}.apply(moved_shares(haze.deviation.x(), pixels.x()), picture,
+                                            by_row, executor);
+  LineBlur{columns, 1, rows, columns}.apply(moved_shares(haze.deviation.y(), pixels.y()), by_row,
+                                            scattered, executor);
+  for (std::size_t i = 0; i < picture.size(); ++i) {
+    picture[i] = (1.0 - haze.share) * picture[i] + haze.share * scattered[i];
+  }
+  return picture;
 }
 
 }  // namespace lensforge

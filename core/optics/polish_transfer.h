@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <vector>
 
+#include "core/compute/executor.h"
+
 namespace lensforge {
+
+struct OpticalSetup;
 
 /// Orders of a polish's transfer function.
 inline constexpr int kPadOrder = 2;   ///< Pads and wheels average heights with a Gaussian.
@@ -64,5 +70,51 @@ const std::vector<LineTerm>& film_over_gaussian_terms();
 /// than 2e-5; with 12 that of slopes by 1.1e-4, although only 4e-5 of the weight of a film's round
 /// kernel lies beyond.
 inline constexpr double kFilmReach = 13.0;
+
+/// Roughness that polishing leaves, finer than all ripples: heights with the autocorrelation
+/// rms² exp(−r² / correlation²).
+struct Roughness {
+  double rms = 0.0;          ///< nm, ≥ 0; 0: not stated.
+  double correlation = 5.0;  ///< µm, > 0.
+
+  [[nodiscard]] bool none() const { return rms == 0.0; }
+
+  friend bool operator==(const Roughness&, const Roughness&) = default;
+};
+
+/// Light that a rough surface scatters beside its rays. Of a surface with the rms roughness σ and
+/// correlation length ℓ it is the share
+///
+///     S = 1 − exp(−(2π σ p / λ)²)
+///
+/// where p is the change of the optical path per height, n − 1 for a lens and 2 cos θ for a mirror
+/// (total integrated scatter; Bennett and Porteus, "Relation between surface roughness and specular
+/// reflectance at normal incidence", JOSA 51, 1961). To first order in S it goes where the
+/// roughness's power spectrum has waves, as exp(−(π ℓ sin θ / λ)²) by the angle θ from the ray
+/// (Stover, Optical Scattering, chapter 4): a Gaussian of direction cosines with the standard
+/// deviation λ / (√2 π ℓ) per axis, on a wall at the distance D one of λ D / (√2 π ℓ).
+struct Haze {
+  double share = 0.0;                   ///< S
+  Eigen::Vector2d deviation{0.0, 0.0};  ///< Standard deviation of the scattered light, pixels.
+  Roughness roughness;
+
+  [[nodiscard]] bool none() const { return share == 0.0; }
+  /// Full width at half maximum of the scattered light, pixels; the greater of both axes.
+  [[nodiscard]] double width() const;
+  /// Of the same surface with `factor` times the roughness.
+  [[nodiscard]] Haze times(double factor) const;
+};
+
+/// Haze of a surface of this height, from its middle to the screen's, with distances on a turned
+/// screen to first order.
+/// @param z  mm. @param wavelength  mm, in air.
+Haze haze_of(const Roughness& roughness, const OpticalSetup& setup, double z, double wavelength);
+
+/// A picture with its haze: (1 − S) of it, and S of its convolution with the scattered light's
+/// Gaussian, both means over pixels. What leaves the picture is lost and nothing comes from beyond
+/// its edges. Without haze the same bits; the same for any number of threads.
+/// @param flux  of every pixel, row by row. @param pixels  columns and rows.
+std::vector<double> hazed(const Haze& haze, std::span<const double> flux,
+                          const Eigen::Vector2i& pixels, const Executor& executor);
 
 }  // namespace lensforge

@@ -204,7 +204,8 @@ double TomlFields::number(const std::string& key, const Limits& limits) {
   const toml::node& node = *table_->find(key);
   const auto value = node.is_number() ? node.value<double>() : std::nullopt;
   if (!value || !std::isfinite(*value)) refuse(key, "must be a finite number");
-  if (!limits.hold(*value)) refuse(key, "must be in " + limits.rule());
+  const char* const must = limits.low_excluded ? "must be " : "must be in ";
+  if (!limits.hold(*value)) refuse(key, must + limits.rule());
   return *value;
 }
 
@@ -349,8 +350,10 @@ void require_limits_at(const Description& description, const std::string& where)
     if (!field.is_number()) continue;
     const double value = number_of(field.get());
     if (field.limits.hold(value) || (field.zero_if_missing && value == 0.0)) continue;
-    throw InputError(where + field.name + ": " + shortest_text(value) + ": must be in " +
-                     shortest_text(field.limits.low) + " to " + shortest_text(field.limits.high));
+    const std::string named = where + field.name + ": " + shortest_text(value);
+    if (field.limits.low_excluded) throw InputError(named + ": must be " + field.limits.rule());
+    throw InputError(named + ": must be in " + shortest_text(field.limits.low) + " to " +
+                     shortest_text(field.limits.high));
   }
 }
 

@@ -102,6 +102,7 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
     if (made.polish_order != 2 || made.polish_floor > 0.0) {
       description.push_back({made.polish_order, made.polish_floor});
     }
+    if (made.roughness > 0.0) description.push_back({made.roughness, made.correlation});
   }
   Fnv1a hash;
   hash.add(description.dump());

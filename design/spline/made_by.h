@@ -23,6 +23,9 @@ struct MadeBy {
   double polish_spread = 0.0;
   int polish_order = 2;       ///< PolishTransfer::order
   double polish_floor = 0.0;  ///< PolishTransfer::floor
+  /// Roughness, which scatters light of the part; a design's shape does not depend on it.
+  double roughness = 0.0;    ///< Roughness::rms, nm
+  double correlation = 5.0;  ///< Roughness::correlation, µm
 
   /// The same process for a part that is cast in a mould cut this way and then polished: the mould
   /// is 1 / (1 − shrinkage) as large.

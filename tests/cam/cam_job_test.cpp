@@ -109,6 +109,41 @@ TEST(CamJob, ByWavesTheVerdictIsTheirs) {
   EXPECT_EQ(read_bytes(rays / "milled.png"), read_bytes(folder / "milled.png"));
 }
 
+/// Without a roughness nothing but a sentence; with one its haze is in picture, causes and verdict,
+/// and places and programs stay those of the surface.
+TEST(CamJob, RoughnessAddsHaze) {
+  CamOptions options = coarse();
+  options.remedies = false;
+  const auto json_of_report = [](const TempFolder& folder) {
+    return nlohmann::json::parse(read_bytes(folder / "report.json"));
+  };
+  const TempFolder clear;
+  const ReportData without = run_cut(small_lens(), options, clear).report;
+  EXPECT_FALSE(json_of_report(clear)["light"].contains("haze"));
+  EXPECT_THAT(without.judged_words(),
+              HasSubstr("Haze is not counted, because the polish's roughness is not stated: 10 nm "
+                        "would scatter 0.313 % of the light."));
+  options.workshop.polish.roughness = 10.0;
+  const TempFolder rough;
+  const ReportData with = run_cut(small_lens(), options, rough).report;
+  const auto report = json_of_report(rough);
+  const auto& haze = report["light"]["haze"];
+  EXPECT_NEAR(haze["share"].get<double>(), 0.00313, 1e-5);
+  EXPECT_GT(haze["width_pixels"].get<double>(), 0.0);
+  EXPECT_EQ(haze["roughness_nm"], 10.0);
+  EXPECT_EQ(haze["correlation_um"], 5.0);
+  EXPECT_THAT(with.judged_words(), HasSubstr("Haze: 0.313 % of the light, spread over "));
+  EXPECT_EQ(report["leakage"]["causes"].back()["cause"], "haze");
+  EXPECT_EQ(report["leakage"]["causes"].size(), without.leakage.parts.size() + 1);
+  double sum = 0.0;
+  for (const CausePart& part : with.leakage.parts) sum += part.leakage;
+  EXPECT_NEAR(sum, with.leakage.part().quality.leakage, 1e-12);
+  EXPECT_NE(read_bytes(clear / "milled.png"), read_bytes(rough / "milled.png"));
+  EXPECT_EQ(read_bytes(clear / "finish.ngc").substr(read_bytes(clear / "finish.ngc").find("G21")),
+            read_bytes(rough / "finish.ngc").substr(read_bytes(rough / "finish.ngc").find("G21")));
+  EXPECT_EQ(json_of_report(clear)["places"], report["places"]);
+}
+
 TEST(CamJob, WavesAskForASurfaceWithoutCreases) {
   const TempFolder folder;
   CamOptions options = coarse();

@@ -84,6 +84,29 @@ TEST_F(MadeBy, ACastPartIsDesignedForItsMould) {
   EXPECT_THAT(warnings(), HasSubstr("was designed for a pitch of 0.036 mm"));
 }
 
+/// The design is the same; its picture of the part has the haze that cam's has.
+TEST_F(MadeBy, APartsRoughnessHazesItsPicture) {
+  ASSERT_EQ(design({"--made-by", path("shop.toml")}).exit_code, 0);
+  const std::string surface = content(at("lens/surface.spline"));
+  const double clear = json_at("lens/lens.json")["provenance"]["made_by"]["metrics"]["mae"];
+  cut({});
+  const double clear_part = part_mae();
+  const std::string overview = content(at("lens/overview.png"));
+  std::ofstream(at("shop.toml"), std::ios::app) << "[polish]\nroughness = 40\n";
+  ASSERT_EQ(design({"--made-by", path("shop.toml")}).exit_code, 0);
+  const nlohmann::json made = json_at("lens/lens.json")["provenance"]["made_by"];
+  EXPECT_EQ(made["roughness_nm"], 40.0);
+  EXPECT_EQ(made["correlation_um"], 5.0);
+  EXPECT_EQ(content(at("lens/surface.spline")), surface);
+  EXPECT_NE(content(at("lens/overview.png")), overview);
+  const double hazed = made["metrics"]["mae"];
+  cut({});
+  EXPECT_GT(hazed, clear + 0.002);
+  EXPECT_NEAR(part_mae() - clear_part, hazed - clear, 0.2 * (hazed - clear));
+  const nlohmann::json haze = json_at("lens/cam/report.json")["light"]["haze"];
+  EXPECT_NEAR(haze["share"], 0.049, 0.001);
+}
+
 /// The programs, cut by brute force into a blank that goes on beyond the lens, polished and traced
 /// by code of its own, rim included.
 TEST_F(MadeBy, APartByBruteForceHasTheForecastsPictureUpToItsRim) {

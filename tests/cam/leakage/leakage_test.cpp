@@ -12,6 +12,7 @@
 #include "cam/analytic_fields.h"
 #include "cam/leakage/render_field.h"
 #include "core/error.h"
+#include "core/optics/polish_transfer.h"
 
 namespace lensforge {
 namespace {
@@ -74,6 +75,50 @@ TEST(Leakage, OfARoundedGrooveIsTheLightOfItsFillet) {
   EXPECT_LT(result.designed.quality.metrics.mae, 1e-6);
   EXPECT_GT(result.part().quality.metrics.mae, 1e-3);
   EXPECT_LT(result.part().quality.metrics.ssim, 1.0);
+}
+
+/// Haze is the last cause: what it adds is the difference of the part's picture with and without
+/// it, and it is on the part wherever that is shown.
+TEST(Leakage, HazeIsTheLastCause) {
+  const AnalyticField sharp(sharp_groove());
+  const AnalyticField rounded(testing::rounded_groove(kGroove, kSlope, kRadius));
+  const Image target = groove_target();
+  LeakageChain chain{{"designed", &sharp},
+                     {{leak_cause::kCrease, &rounded}},
+                     {{"milled", &sharp}, {"polished", &rounded}}};
+  const LeakageResult clear = measure(chain, target);
+  const Haze none;
+  chain.haze = &none;
+  const LeakageResult without = measure(chain, target);
+  EXPECT_EQ(without.steps.size(), 1U);
+  EXPECT_EQ(without.part().picture.flux, clear.part().picture.flux);
+
+  const Haze haze = haze_of({10.0, 5.0}, groove_setup().optics, 5.0, 550e-6);
+  chain.haze = &haze;
+  const LeakageResult result = measure(chain, target);
+  ASSERT_EQ(result.steps.size(), 2U);
+  EXPECT_EQ(result.part().name, leak_cause::kHaze);
+  EXPECT_EQ(result.clear_part().picture.flux, clear.part().picture.flux);
+  EXPECT_EQ(result.part().picture.flux,
+            hazed(haze, clear.part().picture.flux, {20, 20}, Executor::serial()));
+  EXPECT_EQ(result.designed.picture.flux, clear.designed.picture.flux);
+  EXPECT_EQ(result.others[0].picture.flux, clear.others[0].picture.flux);
+  EXPECT_EQ(result.others[1].picture.flux, result.part().picture.flux);
+  EXPECT_EQ(result.others[1].quality.metrics.mae, result.part().quality.metrics.mae);
+  ASSERT_EQ(result.parts.size(), 2U);
+  EXPECT_EQ(result.parts[1].cause, leak_cause::kHaze);
+  EXPECT_EQ(result.parts[0].leakage, clear.parts[0].leakage);
+  EXPECT_GT(result.parts[1].leakage, 0.2 * haze.share);
+  EXPECT_LT(result.parts[1].leakage, haze.share);
+  double leakage = 0.0;
+  double dark_ratio = 0.0;
+  for (const CausePart& part : result.parts) {
+    leakage += part.leakage;
+    dark_ratio += part.dark_ratio;
+  }
+  EXPECT_NEAR(leakage, result.part().quality.leakage, 1e-15);
+  EXPECT_NEAR(dark_ratio, result.part().quality.dark_ratio, 1e-15);
+  EXPECT_LT(result.part().quality.contrast(), clear.part().quality.contrast());
 }
 
 TEST(Leakage, OfATurnedHalfIsItsShareOfTheLens) {

@@ -8,6 +8,7 @@
 #include "cam/analytic_fields.h"
 #include "cam/leakage/leakage.h"
 #include "cam/leakage/render_field.h"
+#include "core/optics/polish_transfer.h"
 
 namespace lensforge {
 namespace {
@@ -95,6 +96,26 @@ TEST(LightChoice, GoesByTheLampAndTheSurface) {
   EXPECT_EQ(choice(LightModel::kAuto, false).words,
             "by rays: the lamp's image is 7.0 pixels wide, and diffraction blurs 2.0");
   EXPECT_TRUE(choice(LightModel::kWaves, false).waves);
+}
+
+TEST(WaveLeakage, HazeIsOnThePictureByWaves) {
+  const AnalyticField flat(testing::plane({0.0, 0.0}), false);
+  const FieldRenderSetup setup = ripple_setup();
+  const Haze haze = haze_of({10.0, 5.0}, setup.optics, 5.0, kWavelength);
+  LeakageChain chain{{"designed", &flat}, {{leak_cause::kPolish, &flat}}, {{"polished", &flat}}};
+  chain.haze = &haze;
+  const Image target = render_field(flat, setup, Executor::serial(), RunControl()).image(1600.0);
+  const LeakageResult rays =
+      measure_leakage(chain, target, setup, {}, Executor::serial(), RunControl());
+  const LeakageResult waves = measure_waves(chain, rays.designed, target, setup, {}, kWavelength,
+                                            0.0, Executor::cpu(2), RunControl())
+                                  .result;
+  for (const LeakageResult* result : {&rays, &waves}) {
+    EXPECT_EQ(result->parts.back().cause, leak_cause::kHaze);
+    EXPECT_EQ(result->part().picture.flux,
+              hazed(haze, result->designed.picture.flux, setup.optics.pixels, Executor::serial()));
+    EXPECT_EQ(result->others[0].picture.flux, result->part().picture.flux);
+  }
 }
 
 }  // namespace

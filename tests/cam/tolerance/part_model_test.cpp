@@ -297,6 +297,18 @@ TEST_F(PartModelTest, PartsOfOtherPolishesAreThoseOfTheChain) {
   }
 }
 
+TEST_F(PartModelTest, PartsHaveTheHazeOfTheirRoughness) {
+  PartPlan plan = part_plan();
+  const PartModel clear(*milled_, plan, executor(), RunControl());
+  plan.haze = haze_of({10.0, 5.0}, plan.optics, 3.0, 550e-6);
+  const PartModel rough(*milled_, plan, executor(), RunControl());
+  PartError error;
+  error.roughness_factor = 1.3;
+  EXPECT_EQ(rough.render(error, executor()).flux,
+            hazed(plan.haze.times(1.3), clear.render(error, executor()).flux, plan.optics.pixels,
+                  executor()));
+}
+
 /// A polish that is stronger everywhere by its pattern over the part, a wave without length.
 TEST_F(PartModelTest, AFilmThatIsStrongerOverAPartIsAStrongerFilm) {
   PartPlan plan = part_plan();

@@ -158,9 +158,9 @@ TEST(Workshop, WrittenTomlReadsBackEqual) {
   shop.process.semi.helix_radius = 0.45;
   shop.process.finish = {1,     0.04, 0.001, 2e-4, 5e-4,  PassStyle::kConventional, PassAxis::kY,
                          false, true, 4,     2,    -0.001};
-  shop.polish = {0.041, 0.01, 2.5, 4, 0.07};
-  shop.tolerances = {{{8.0, 0.5}}, 0.1, 20.0, 2.0,  3.0, 4.0,  0.2,    0.1,
-                     0.002,        2.5, 0.3,  1.25, 8.0, 9e-5, -1.2e-4};
+  shop.polish = {0.041, 0.01, 2.5, 4, 0.07, 12.5, 7.5};
+  shop.tolerances = {{{8.0, 0.5}}, 0.1,   20.0, 2.0, 3.0,  4.0, 0.2,  0.1,
+                     0.15,         0.002, 2.5,  0.3, 1.25, 8.0, 9e-5, -1.2e-4};
   EXPECT_EQ(parse_workshop(workshop_toml(shop), "other"), shop);
 }
 
@@ -209,6 +209,10 @@ TEST(Workshop, RefusalsNameFileKeyValueAndRule) {
   EXPECT_EQ(refusal("[polish]\norder = 3\n"),
             "shop.toml: polish.order: 3: must be 2 (pads and wheels) or 4 (a levelling film)");
   EXPECT_EQ(refusal("[polish]\nfloor = 1.0\n"), "shop.toml: polish.floor: 1: must be in 0 to 0.99");
+  EXPECT_EQ(refusal("[polish]\nroughness = -1.0\n"),
+            "shop.toml: polish.roughness: -1: must be in 0 to 1000");
+  EXPECT_EQ(refusal("[polish]\ncorrelation = 0.0\n"),
+            "shop.toml: polish.correlation: 0: must be above 0, at most 1000");
   EXPECT_EQ(refusal("[semi]\nallowance = 0.3\n"),
             "shop.toml: semi.allowance: 0.3: must not be above that of roughing, 0.2 mm");
   EXPECT_EQ(refusal("[finish]\ntool = 3\n"),

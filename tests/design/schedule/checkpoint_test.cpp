@@ -272,7 +272,9 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
                          {.rim_length = 2.0},
                          {.polish_spread = 0.1},
                          {.polish_order = 4},
-                         {.polish_floor = 0.1}};
+                         {.polish_floor = 0.1},
+                         {.roughness = 10.0},
+                         {.roughness = 10.0, .correlation = 4.0}};
   EXPECT_EQ(std::size(made), testing::member_count<MadeBy>() + 1);
   for (const MadeBy& process : made) {
     DesignOptions options;
