@@ -84,9 +84,8 @@ constexpr double kMemoryPerPartNode = 24.0;     ///< Bytes: three heights while 
 constexpr double kSurfaces = 8.0;               ///< Number rendered.
 
 /// Seconds per mm² of a surface, times distance over wavelength: fields are as fine as their rays
-/// and diffraction are wide. A 128² portrait on 25 mm at 75 mm takes 11 s, a 256² one on 100 mm at
-/// 300 mm 60 s.
-constexpr double kSecondsPerWave = 2500.0;
+/// and diffraction are wide. Each of the four of a 128² portrait on 25 mm at 75 mm takes 17 s.
+constexpr double kSecondsPerWave = 3700.0;
 constexpr double kWaveSurfaces = 4.0;  ///< Number whose waves are computed.
 /// Bytes of the fields of two tiles and of the samples of a batch.
 constexpr double kMemoryOfWaves = 6e8;
@@ -151,6 +150,10 @@ double samples_of(const CamOptions& options, const OpticalSetup& setup) {
   return kSurfaces * setup.lens_size.prod() / spacings.prod();
 }
 
+double wavelength_of(const CamOptions& options, const OpticalSetup& setup) {
+  return middle_wavelength(setup, 1e-6 * options.wavelength_nm);
+}
+
 /// True if waves are computed, as far as that can be told without the lens's surface.
 bool may_take_waves(const CamOptions& options, const OpticalSetup& setup) {
   const bool creased =
@@ -161,7 +164,7 @@ bool may_take_waves(const CamOptions& options, const OpticalSetup& setup) {
 
 double wave_seconds(const CamOptions& options, const OpticalSetup& setup) {
   if (!may_take_waves(options, setup)) return 0.0;
-  const double wavelength = middle_wavelength(setup);
+  const double wavelength = wavelength_of(options, setup);
   const double distance = std::pow(diffraction_width(setup, 0.0, wavelength), 2) / wavelength;
   return kWaveSurfaces * kSecondsPerWave * setup.lens_size.prod() * wavelength / distance;
 }

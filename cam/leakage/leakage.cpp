@@ -291,9 +291,9 @@ LightChoice light_choice(const FieldRenderSetup& setup, LightModel asked, bool c
     return {false, "by rays: the part has creases, which a wave does not show as rays do"};
   }
   if (asked == LightModel::kRays) return {false, "by rays, as asked"};
+  if (asked == LightModel::kWaves) return {true, "by waves, as asked"};
   const std::vector<PictureBlur> blurs =
       light_blurs(setup.optics, setup.surface_height, wavelength);
-  if (asked == LightModel::kWaves) return {true, "by waves, as asked"};
   if (blurs[0].pixels <= kWideSource * blurs[1].pixels) return {true, "by waves"};
   return {false,
           joined({"by rays: the lamp's image is ", decimal_text(blurs[0].pixels, 1),

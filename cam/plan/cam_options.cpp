@@ -103,6 +103,13 @@ void validate_outline(const CamOptions& options) {
   }
 }
 
+/// A lens with a spectrum is lit by it.
+void validate_wavelength(const CamOptions& options, const OpticalSetup& setup) {
+  if (setup.spectrum.none() || options.wavelength_nm == CamOptions().wavelength_nm) return;
+  refuse("--wavelength", options.wavelength_nm,
+         "the lens has wavelengths of its own, which are used; leave it out");
+}
+
 /// On a smaller blank the rim would fall off, and polish would take that for the surface.
 void validate_margin(const CamOptions& options) {
   const double margin = options.workshop.stock.margin;
@@ -248,6 +255,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_sampling(options);
   validate_tolerances(options);
   validate_tolerances(options, setup);
+  validate_wavelength(options, setup);
   validate_margin(options);
   validate_front(options, setup);
   validate_outline(options);

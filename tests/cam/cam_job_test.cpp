@@ -144,6 +144,16 @@ TEST(CamJob, RoughnessAddsHaze) {
   EXPECT_EQ(json_of_report(clear)["places"], report["places"]);
 }
 
+TEST(CamJob, ALensWithASpectrumHasItsOwnWavelengths) {
+  const TempFolder folder;
+  Lens lens = small_lens();
+  lens.setup.spectrum.wavelengths = {450.0, 550.0, 650.0};
+  CamOptions options = coarse();
+  options.wavelength_nm = 633.0;
+  EXPECT_THAT([&] { run_cut(lens, options, folder); },
+              ::testing::ThrowsMessage<InputError>(HasSubstr("--wavelength 633: the lens has")));
+}
+
 TEST(CamJob, WavesAskForASurfaceWithoutCreases) {
   const TempFolder folder;
   CamOptions options = coarse();
