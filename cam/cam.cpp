@@ -11,6 +11,7 @@
 #include "cam/job/cut_job.h"
 #include "cam/job/job_files.h"
 #include "cam/leakage/render_field.h"
+#include "cam/plan/cut_plan.h"
 #include "cam/plan/finishing.h"
 #include "cam/predict/prediction.h"
 #include "cam/tolerance/part_model.h"
@@ -157,7 +158,7 @@ double wavelength_of(const CamOptions& options, const OpticalSetup& setup) {
 /// True if waves are computed, as far as that can be told without the lens's surface.
 bool may_take_waves(const CamOptions& options, const OpticalSetup& setup) {
   const bool creased =
-      options.surface == SurfaceModel::kFacet || options.workshop.polish.sigma == 0.0;
+      leaves_creases(options.surface.value_or(SurfaceModel::kSmooth), options.workshop.polish);
   return options.render &&
          light_choice({setup, {}}, options.light, creased, middle_wavelength(setup)).waves;
 }

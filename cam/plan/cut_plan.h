@@ -25,6 +25,11 @@
 /// (cam/predict) and report (cam/job) follow.
 namespace lensforge {
 
+/// True if a part's surfaces have creases: facets, or without polish the cusps between rows.
+inline bool leaves_creases(SurfaceModel model, const PolishModel& polish) {
+  return model == SurfaceModel::kFacet || polish.sigma == 0.0;
+}
+
 /// A part and its blank in a frame of the part's own.
 struct CutSetup {
   const Lens* lens = nullptr;
@@ -40,10 +45,7 @@ struct CutSetup {
   /// frame of its own.
   std::shared_ptr<const OpticalSurface> optical;
 
-  /// True if the part's surfaces have creases: facets, or without polish the cusps between rows.
-  [[nodiscard]] bool is_creased() const {
-    return model == SurfaceModel::kFacet || options.workshop.polish.sigma == 0.0;
-  }
+  [[nodiscard]] bool is_creased() const { return leaves_creases(model, options.workshop.polish); }
   /// Mesh of the surface to cut.
   [[nodiscard]] const SurfaceMesh& mesh() const { return optical->mesh(); }
   /// Frame of the lens in the mould, if there is one.

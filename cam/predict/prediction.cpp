@@ -50,9 +50,6 @@ constexpr double kMmPerNm = 1e-6;
 /// much farther.
 constexpr double kOrderWidth = 1.2;
 
-/// Full width at half maximum of a Gaussian, in its σ.
-constexpr double kFullWidth = 2.355;
-
 /// Blurs of the light, of the polish, which moves the picture's detail like the lens's, and of the
 /// ripple that polish leaves of the rows: twice as far as its steepest slope moves a ray. Of a
 /// parabola's p²/(8 R) the ripple's amplitude is p²/(2π² R).
@@ -62,7 +59,7 @@ std::vector<PictureBlur> blurs_of(const OpticalSetup& setup, const CamOptions& o
   const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
   const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();
   const PolishModel& polish = options.workshop.polish;
-  blurs.push_back({"polish", kFullWidth * polish.sigma * enlarged / pixel.minCoeff()});
+  blurs.push_back({"polish", kGaussianWidth * polish.sigma * enlarged / pixel.minCoeff()});
   constexpr double kPi = std::numbers::pi;
   const double k = 2.0 * kPi / passes.pitch;
   const double amplitude = passes.pitch * passes.pitch /

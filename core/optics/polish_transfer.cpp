@@ -97,9 +97,6 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kMmPerNm = 1e-6;
 constexpr double kMmPerMicrometre = 1e-3;
 
-/// Full width at half maximum of a Gaussian, in its standard deviations: 2 √(2 ln 2).
-constexpr double kFullWidth = 2.3548200450309493;
-
 /// Standard deviations after which a Gaussian ends: 2e-9 of it lie beyond.
 constexpr double kGaussianReach = 6.0;
 
@@ -165,7 +162,7 @@ struct LineBlur {
 
 }  // namespace
 
-double Haze::width() const { return kFullWidth * deviation.maxCoeff(); }
+double Haze::width() const { return kGaussianWidth * deviation.maxCoeff(); }
 
 Haze Haze::times(double factor) const {
   Haze other = *this;

@@ -71,6 +71,9 @@ const std::vector<LineTerm>& film_over_gaussian_terms();
 /// kernel lies beyond.
 inline constexpr double kFilmReach = 13.0;
 
+/// Full width at half maximum of a Gaussian, in its standard deviations: 2 √(2 ln 2).
+inline constexpr double kGaussianWidth = 2.3548200450309493;
+
 /// Roughness that polishing leaves, finer than all ripples: heights with the autocorrelation
 /// rms² exp(−r² / correlation²).
 struct Roughness {
