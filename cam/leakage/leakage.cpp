@@ -300,21 +300,22 @@ LightChoice light_choice(const FieldRenderSetup& setup, LightModel asked, bool c
                   " pixels wide, and diffraction blurs ", decimal_text(blurs[1].pixels, 1)})};
 }
 
-WaveLeakage measure_waves(const LeakageChain& chain, const RenderedSurface& rays,
-                          const Image& target, const FieldRenderSetup& setup,
-                          const LeakageOptions& options, double wavelength, double scatter,
+WaveLeakage measure_waves(const LeakageChain& chain, const Image& target,
+                          const FieldRenderSetup& setup, const LeakageOptions& options,
                           const Executor& executor, const RunControl& control) {
   validate(options);
+  LF_CHECK(chain.waves.rays != nullptr, chain.designed.name);
   require_pixels(target, setup.optics);
+  const double wavelength = chain.waves.wavelength;
   WaveOptions waves;
   waves.wavelength = wavelength;
-  waves.scatter = scatter;
+  waves.scatter = chain.waves.scatter;
   const ChainPictures pictures = pictures_by_waves(chain, setup, waves, executor, control);
   const FluxPicture& designed = pictures.at(chain.designed.field);
   const PictureJudge judge(target, designed, options);
   WaveLeakage measured{judged(chain, pictures, judge, executor), wavelength,
                        diffraction_width(setup.optics, setup.surface_height, wavelength)};
-  measured.result.rays = rays;
+  measured.result.rays = *chain.waves.rays;
   measured.result.parts = parts_of(measured.result);
   return measured;
 }

@@ -107,6 +107,15 @@ inline constexpr const char* kHaze = "haze";  ///< Behind the chain, if the work
 using TileObserver =
     std::function<void(const SurfaceField&, const CellRange&, const SurfacePatch&)>;
 
+struct RenderedSurface;
+
+/// What a chain's pictures by waves need besides its setup.
+struct ChainWaves {
+  double wavelength = 0.0;                ///< mm; of a setup without a spectrum.
+  double scatter = 0.0;                   ///< WaveOptions::scatter
+  const RenderedSurface* rays = nullptr;  ///< The designed surface by rays.
+};
+
 /// Surfaces from the designed one to the part; each adds one cause of wrong light to the one
 /// before.
 struct LeakageChain {
@@ -115,6 +124,7 @@ struct LeakageChain {
   std::vector<NamedSurface> others;  ///< Only rendered and compared.
   TileObserver observe = {};         ///< Sees the tiles of those without a grid of their own.
   const Haze* haze = nullptr;        ///< Of the part's picture: the last cause, if there is any.
+  ChainWaves waves = {};             ///< Of measure_waves() alone.
 
   [[nodiscard]] const NamedSurface& part() const { return steps.back(); }
 };
@@ -209,11 +219,9 @@ struct WaveLeakage {
 
 /// measure_leakage() by wave_flux(); other surfaces than those of the chain's steps are left out.
 /// Leakage is measured against the designed surface by waves: it is what the part adds.
-/// @param rays        the designed surface by rays.
-/// @param wavelength  mm; of a setup without a spectrum. @param scatter  WaveOptions::scatter
-WaveLeakage measure_waves(const LeakageChain& chain, const RenderedSurface& rays,
-                          const Image& target, const FieldRenderSetup& setup,
-                          const LeakageOptions& options, double wavelength, double scatter,
+/// @pre chain.waves says which.
+WaveLeakage measure_waves(const LeakageChain& chain, const Image& target,
+                          const FieldRenderSetup& setup, const LeakageOptions& options,
                           const Executor& executor, const RunControl& control);
 
 /// 1 where `part` has more flux than `designed`, 0 elsewhere. @pre equal sizes.

@@ -122,9 +122,11 @@ ReportMap height_map(const LeakMap& map) {
 
 }  // namespace
 
-Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Passes& passes, bool creased, const Executor& executor,
+Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const Executor& executor,
                         const RunControl& control) {
+  const Lens& lens = *cut.lens;
+  const CamOptions& options = cut.options;
+  const Passes passes = cut.passes();
   Prediction result;
   LeakageChain chain = surfaces.chain();
   const Eigen::Vector2d spacings = sample_spacings(options, lens.setup, passes);
@@ -156,15 +158,15 @@ Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const Ca
   chain.haze = &result.haze;
   result.haze_words = haze_words(result.haze, haze({kExampleRoughness, roughness.correlation}));
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
-  const LightChoice light = light_choice(setup, options.light, creased, wavelength);
+  const LightChoice light = light_choice(setup, options.light, cut.is_creased(), wavelength);
   result.light_words = light.words;
   result.blurs = blurs_of(lens.setup, options, passes, setup.surface_height, wavelength);
   if (light.waves) {
     LeakageChain by_waves = surfaces.short_chain();
     by_waves.haze = &result.haze;
-    result.waves =
-        measure_waves(by_waves, result.leakage.designed, lens.target, setup, options.leakage,
-                      wavelength, kOrderWidth * wavelength / passes.pitch, executor, control);
+    by_waves.waves = {wavelength, kOrderWidth * wavelength / passes.pitch,
+                      &result.leakage.designed};
+    result.waves = measure_waves(by_waves, lens.target, setup, options.leakage, executor, control);
   }
   result.sampling = check_sampling(chain, result.leakage, lens.target, setup, executor, control);
   // Places and remedies are those of the surface. Haze is no place's: with it the map's total would
@@ -600,8 +602,7 @@ Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const Cut
                        const Executor& executor, const RunControl& control) {
   const CamOptions& options = setup.options;
   const PartSurfaces& surfaces = cut.surfaces();
-  Prediction prediction = predict_part(surfaces, *setup.lens, options, setup.passes(),
-                                       setup.is_creased(), executor, control);
+  Prediction prediction = predict_part(surfaces, setup, executor, control);
   if (options.remedies) {
     try_remedies({setup, passes, surfaces.part(), prediction.leakage}, prediction.places, executor,
                  control);

@@ -55,10 +55,7 @@ inline constexpr double kMeshSpacing = 0.1;
 /// Renders every surface from the design to the polished part and finds where light leaks, by rays
 /// and, where the light model asks for it, by waves. Memory does not grow with the number of
 /// samples. @throw Interrupted
-/// @param passes   on the lens.
-/// @param creased  CutSetup::is_creased()
-Prediction predict_part(const PartSurfaces& surfaces, const Lens& lens, const CamOptions& options,
-                        const Passes& passes, bool creased, const Executor& executor,
+Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const Executor& executor,
                         const RunControl& control);
 
 /// A predicted cut, for trying its places again.

@@ -47,7 +47,8 @@ TEST(PartLayers, EveryNodeHasTheSurfacesHeightAndSlopesTheUppermostFirst) {
     for (int column = 0; column < layers.columns(); column += 7) {
       const double x = kSize.x() * column / (layers.columns() - 1);
       const double y = kSize.y() * (1.0 - static_cast<double>(row) / (layers.rows() - 1));
-      const auto at = static_cast<std::size_t>(row * layers.columns() + column);
+      const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(layers.columns()) +
+                      static_cast<std::size_t>(column);
       EXPECT_NEAR(layers.layer("a.z")[at], 5.0 + std::sin(x) + 0.1 * y, 1e-6);
       EXPECT_NEAR(layers.layer("a.slope_x")[at], std::cos(x), 1e-6);
       EXPECT_NEAR(layers.layer("a.slope_y")[at], 0.1, 1e-6);

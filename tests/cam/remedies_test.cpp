@@ -67,8 +67,7 @@ class Predicted {
     cut_.emplace(setup_, passes_,
                  finish_paths(setup_, passes_, std::move(record.rows), {programs}, control),
                  executor_);
-    prediction_ =
-        predict_part(surfaces(), lens_, options_, setup_.passes(), false, executor_, control);
+    prediction_ = predict_part(surfaces(), setup_, executor_, control);
   }
 
   [[nodiscard]] TrialSite site() const {

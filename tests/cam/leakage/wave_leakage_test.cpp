@@ -60,9 +60,8 @@ TEST(WaveLeakage, OfARippleIsInItsOrders) {
   const Image target = render_field(flat, setup, Executor::serial(), RunControl()).image(1600.0);
   const LeakageResult rays =
       measure_leakage(chain, target, setup, {}, Executor::serial(), RunControl());
-  const WaveLeakage waves =
-      measure_waves(chain, rays.designed, target, setup, {}, kWavelength,
-                    1.2 * kWavelength / kPeriod, Executor::cpu(2), RunControl());
+  chain.waves = {kWavelength, 1.2 * kWavelength / kPeriod, &rays.designed};
+  const WaveLeakage waves = measure_waves(chain, target, setup, {}, Executor::cpu(2), RunControl());
   const double phase = 2.0 * std::numbers::pi * (setup.optics.ior - 1.0) * kDepth / kWavelength;
   const double orders = 2.0 * std::pow(std::cyl_bessel_j(1, phase), 2);
   const LeakageResult& result = waves.result;
@@ -107,9 +106,9 @@ TEST(WaveLeakage, HazeIsOnThePictureByWaves) {
   const Image target = render_field(flat, setup, Executor::serial(), RunControl()).image(1600.0);
   const LeakageResult rays =
       measure_leakage(chain, target, setup, {}, Executor::serial(), RunControl());
-  const LeakageResult waves = measure_waves(chain, rays.designed, target, setup, {}, kWavelength,
-                                            0.0, Executor::cpu(2), RunControl())
-                                  .result;
+  chain.waves = {kWavelength, 0.0, &rays.designed};
+  const LeakageResult waves =
+      measure_waves(chain, target, setup, {}, Executor::cpu(2), RunControl()).result;
   for (const LeakageResult* result : {&rays, &waves}) {
     EXPECT_EQ(result->parts.back().cause, leak_cause::kHaze);
     EXPECT_EQ(result->part().picture.flux,

@@ -35,7 +35,7 @@ class RoughLens final : public SurfaceField {
     const double wave = std::numbers::sqrt2 / (1e-3 * roughness.correlation);
     amplitude_ = 1e-6 * roughness.rms * std::sqrt(2.0 / kWaves);
     for (int w = 0; w < kWaves; ++w) {
-      waves_.push_back({wave * normal(random), wave * normal(random), phase(random)});
+      waves_.emplace_back(wave * normal(random), wave * normal(random), phase(random));
     }
   }
 
@@ -131,7 +131,8 @@ double ring(const std::vector<double>& picture, double low, double high) {
   for (std::size_t k = 0; k < picture.size(); ++k) {
     const double pixel = kWall / kPixels;
     const double x = pixel * (static_cast<double>(k % kPixels) + 0.5) - 0.5 * kWall;
-    const double y = pixel * (static_cast<double>(k / kPixels) + 0.5) - 0.5 * kWall;
+    const std::size_t row = k / kPixels;
+    const double y = pixel * (static_cast<double>(row) + 0.5) - 0.5 * kWall;
     const double r = std::hypot(x, y);
     const bool cross = std::abs(x) < kCross || std::abs(y) < kCross;
     if (!cross && r >= low && r < high) sum += picture[k];
