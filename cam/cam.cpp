@@ -18,6 +18,7 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/optics/picture_blur.h"
 #include "core/text/number_text.h"
 #include "design/waves/wave_picture.h"
 
@@ -84,9 +85,6 @@ constexpr double kSecondsPerPartNode = 1.9e-7;  ///< Of a part with errors (docs
 constexpr double kMemoryPerPartNode = 24.0;     ///< Bytes: three heights while they are sampled.
 constexpr double kSurfaces = 8.0;               ///< Number rendered.
 
-/// Seconds per mm² of a surface, times distance over wavelength: fields are as fine as their rays
-/// and diffraction are wide. Each of the four of a 128² portrait on 25 mm at 75 mm takes 17 s.
-constexpr double kSecondsPerWave = 3700.0;
 constexpr double kWaveSurfaces = 4.0;  ///< Number whose waves are computed.
 /// Bytes of the fields of two tiles and of the samples of a batch.
 constexpr double kMemoryOfWaves = 6e8;
@@ -152,7 +150,7 @@ double samples_of(const CamOptions& options, const OpticalSetup& setup) {
 }
 
 double wavelength_of(const CamOptions& options, const OpticalSetup& setup) {
-  return middle_wavelength(setup, 1e-6 * options.wavelength_nm);
+  return middle_wavelength(setup, kMmPerNm * options.wavelength_nm);
 }
 
 /// True if waves are computed, as far as that can be told without the lens's surface.
@@ -163,11 +161,9 @@ bool may_take_waves(const CamOptions& options, const OpticalSetup& setup) {
          light_choice({setup, {}}, options.light, creased, middle_wavelength(setup)).waves;
 }
 
-double wave_seconds(const CamOptions& options, const OpticalSetup& setup) {
+double seconds_by_waves(const CamOptions& options, const OpticalSetup& setup) {
   if (!may_take_waves(options, setup)) return 0.0;
-  const double wavelength = wavelength_of(options, setup);
-  const double distance = std::pow(diffraction_width(setup, 0.0, wavelength), 2) / wavelength;
-  return kWaveSurfaces * kSecondsPerWave * setup.lens_size.prod() * wavelength / distance;
+  return kWaveSurfaces * wave_seconds(setup, wavelength_of(options, setup));
 }
 
 double memory_per_move(const FinishProcess& finish) {
@@ -217,7 +213,7 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   WorkEstimate estimate;
   estimate.seconds =
       (length * seconds_per_mm(options) + points * kSecondsPerPoint +
-       samples_of(options, setup) * kSecondsPerSample + wave_seconds(options, setup) +
+       samples_of(options, setup) * kSecondsPerSample + seconds_by_waves(options, setup) +
        drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode) /
       threads;
   estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;

@@ -46,6 +46,13 @@ struct DesignResult {
     Image picture;
   };
   std::optional<Made> made;
+  /// The picture as a wave makes it, of the part where there is one; where the last steps followed it.
+  struct Wall {
+    ImageMetrics metrics;
+    Image picture;
+    double wavelength = 0.0;  ///< mm; the middle one of a spectrum.
+  };
+  std::optional<Wall> wall;
   std::optional<SourceCheck> source;  ///< Extended sources only.
   /// Result for a spectrum.
   struct Colors {

@@ -40,11 +40,11 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/light_source.h"
+#include "core/optics/picture_blur.h"
 #include "core/page/drawings.h"
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
 #include "core/spline/control_net.h"
-#include "core/text/printable.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
 #include "design/design.h"
@@ -52,7 +52,6 @@
 #include "design/schedule/levels.h"
 #include "design/setup/design_options.h"
 #include "design/setup/option_tables.h"
-#include "design/waves/wave_picture.h"
 
 namespace lensforge::app {
 namespace {
@@ -418,6 +417,12 @@ nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) 
 
 }  // namespace
 
+nlohmann::json waves_json(const DesignResult::Wall& wall) {
+  nlohmann::json fields = metrics_json(wall.metrics);
+  fields["wavelength_nm"] = wall.wavelength / kMmPerNm;
+  return fields;
+}
+
 nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& device,
                                  const DesignOptions& design, const DesignResult& result) {
   const bool done = result.status == DesignResult::Status::kDone;
@@ -433,24 +438,29 @@ nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& d
   if (result.source) fields["source_check"] = source_json(*result.source);
   if (result.colors) fields["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) fields["made_by"] = made_json(*design.made_by, *result.made);
+  if (result.wall) fields["waves"] = waves_json(*result.wall);
   return fields;
 }
 
 void write_design(const fs::path& folder, const DesignResult& result, const Console& console) {
   PendingFiles files(folder);
   files.add(lens_file::kConvergence, convergence_csv(result.convergence));
-  const Image* const made = result.made ? &result.made->picture : nullptr;
   files.add(lens_file::kOverview,
-            [&](const fs::path& beside) { write_image(draw_overview(result.lens, made), beside); });
+            [&](const fs::path& beside) { write_image(draw_overview(result), beside); });
   files.add(lens_file::kSetup,
             light_drawing_file(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
   if (result.colors) {
     files.add(lens_file::kRenderColor,
               [&](const fs::path& beside) { write_image(result.colors->picture, beside); });
   }
+  if (result.wall) {
+    files.add(lens_file::kWall,
+              [&](const fs::path& beside) { write_image(result.wall->picture, beside); });
+  }
   write_lens(result.lens, std::move(files));
   std::error_code ignored;
   if (!result.colors) fs::remove(folder / lens_file::kRenderColor, ignored);
+  if (!result.wall) fs::remove(folder / lens_file::kWall, ignored);
   const fs::path cut = folder / lens_file::kCut;
   if (!fs::is_directory(cut, ignored)) return;
   remove_cut(cut);
@@ -518,6 +528,7 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
   if (result.source) summary["source_check"] = source_json(*result.source);
   if (result.colors) summary["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) summary["made"] = metrics_json(result.made->metrics);
+  if (result.wall) summary["waves"] = waves_json(*result.wall);
   return summary;
 }
 
@@ -527,6 +538,7 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          metrics_text(lens) +                              //
          (result.colors ? fringe_text(result.colors->fringe) : "") +
          (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") +
+         (result.wall ? "  by waves " + metrics_text(result.wall->metrics) + "\n" : "") +
          "  on the wall " + blur_words(blurs_of(lens)) + "\n  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
          std::to_string(lens.surface.vertex_count()) + " vertices, " +

@@ -24,7 +24,7 @@
 #include "core/lens/setup_json.h"
 #include "core/mesh/mesh_files.h"
 #include "core/optics/light_path.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "export/files/mesh_formats.h"
 #include "export/solid/iges_file.h"
 #include "export/solid/step_file.h"

@@ -20,8 +20,8 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/text/number_list.h"
 #include "core/text/number_text.h"
+#include "core/text/read_numbers.h"
 
 namespace lensforge::app {
 namespace {

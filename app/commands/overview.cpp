@@ -142,13 +142,18 @@ Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int column
   return resample(image, columns, rows);
 }
 
-Image draw_overview(const Lens& lens, const Image* made) {
+Image draw_overview(const DesignResult& result) {
+  const Lens& lens = result.lens;
   const int longer = std::max(lens.target.columns(), lens.target.rows());
   const int columns = std::max(1, lens.target.columns() * kPanelSide / longer);
   const int rows = std::max(1, lens.target.rows() * kPanelSide / longer);
   std::vector<Image> panels = {resample(lens.target, columns, rows),
                                resample(lens.render, columns, rows)};
-  if (made != nullptr) panels.push_back(resample(*made, columns, rows));
+  if (result.wall) {
+    panels.push_back(resample(result.wall->picture, columns, rows));
+  } else if (result.made) {
+    panels.push_back(resample(result.made->picture, columns, rows));
+  }
   const bool shaped = lens.setup.outline.has_value();
   panels.push_back(draw_relief(shaped ? lens_part(lens, Executor::serial()).mesh : lens.surface,
                                lens.setup, columns, rows));

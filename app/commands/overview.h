@@ -3,15 +3,15 @@
 
 #include "core/image/image.h"
 #include "core/lens/lens.h"
+#include "design/design.h"
 
 namespace lensforge::app {
 
-/// Overview picture: the target, the projected picture, the predicted picture of the part as made
-/// (if known), and the surface side by side, each in the orientation of the target. The surface is
+/// Overview picture: the target, the projected picture, that by waves or of the part as made (if
+/// known), and the surface side by side, each in the orientation of the target. The surface is
 /// a relief lit from the upper left, without its broad curvature and with stretched contrast, which
 /// shows creases too shallow to see otherwise.
-/// @param made  picture of the part as made, in the pixels of the lens's render; may be null.
-Image draw_overview(const Lens& lens, const Image* made);
+Image draw_overview(const DesignResult& result);
 
 /// The relief alone, `columns` × `rows`, linear light.
 Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int columns, int rows);

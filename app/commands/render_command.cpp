@@ -21,6 +21,7 @@
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/picture_blur.h"
 #include "core/spline/control_net.h"
 #include "core/text/number_text.h"
 #include "design/design.h"
@@ -295,7 +296,7 @@ void add_waves(const Scene& scene, double wavelength_nm, CommandFrame& frame,
       model == SurfaceModel::kSpline ? std::make_shared<const SplineSurface>(*scene.net)
                                      : optical_surface(scene.surface, model);
   WaveOptions options;
-  options.wavelength = 1e-6 * wavelength_nm;
+  options.wavelength = kMmPerNm * wavelength_nm;
   const OpticalField field(*surface);
   const SurfaceField* const one = &field;
   const std::vector<double> flux = wave_flux(setup, wave_grid(setup, *surface), {&one, 1}, options,

@@ -20,7 +20,7 @@
 #include "app/frame/option_set.h"
 #include "app/frame/terminal_keys.h"
 #include "core/error.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "machine/link/port.h"
 #include "machine/send.h"
 

@@ -21,8 +21,8 @@
 #include "app/frame/console.h"
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/text/printable.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge::app {
 namespace {

@@ -10,7 +10,6 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/text/printable.h"
 #include "core/text/words.h"
 
 namespace lensforge::app {

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge::app {
 namespace {

@@ -14,7 +14,7 @@
 #include "core/io/files.h"
 #include "core/optics/polish_transfer.h"
 #include "core/text/number_text.h"
-#include "core/text/units.h"
+#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 
 namespace lensforge {

@@ -18,6 +18,7 @@
 #include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/picture_blur.h"
 #include "core/optics/polish_transfer.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
@@ -294,7 +295,7 @@ LightChoice light_choice(const FieldRenderSetup& setup, LightModel asked, bool c
   if (asked == LightModel::kWaves) return {true, "by waves, as asked"};
   const std::vector<PictureBlur> blurs =
       light_blurs(setup.optics, setup.surface_height, wavelength);
-  if (blurs[0].pixels <= kWideSource * blurs[1].pixels) return {true, "by waves"};
+  if (waves_show(blurs)) return {true, "by waves"};
   return {false,
           joined({"by rays: the lamp's image is ", decimal_text(blurs[0].pixels, 1),
                   " pixels wide, and diffraction blurs ", decimal_text(blurs[1].pixels, 1)})};

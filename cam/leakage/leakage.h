@@ -12,6 +12,7 @@
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/lens/surface_field.h"
+#include "core/optics/optical_setup.h"
 
 namespace lensforge {
 
@@ -186,29 +187,17 @@ LeakageResult measure_leakage(const LeakageChain& chain, const Image& target,
                               const FieldRenderSetup& setup, const LeakageOptions& options,
                               const Executor& executor, const RunControl& control);
 
-/// What a picture is computed of.
-enum class LightModel {
-  kAuto,  ///< Waves where they show: see light_choice().
-  kRays,
-  kWaves,
-};
-
 /// A choice of the model, and the reason for it in a sentence.
 struct LightChoice {
   bool waves = false;
   std::string words;
 };
 
-/// Rays if the surface has creases, which a wave does not show as rays do, or if the image of the
-/// source is wider than kWideSource times what diffraction blurs (diffraction_width()): a picture
-/// by waves is then that of rays.
+/// Rays if the surface has creases, which a wave does not show as rays do, or unless waves_show().
 /// @param asked       kAuto leaves the choice.
 /// @param wavelength  mm; of a setup without a spectrum.
 LightChoice light_choice(const FieldRenderSetup& setup, LightModel asked, bool creases,
                          double wavelength);
-
-/// At 3.4 times (the sun through a 25 mm lens at 75 mm) waves add 0.0003 to 0.0011 of MAE.
-inline constexpr double kWideSource = 3.0;
 
 /// A chain's pictures by scalar waves.
 struct WaveLeakage {

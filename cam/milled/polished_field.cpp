@@ -99,8 +99,9 @@ std::vector<KernelPair> kernels_of(const PolishModel& model, const Eigen::Vector
     double mean = 0.0;
     Eigen::Vector2d rise(0.0, 0.0);
     for (const LineTerm& term : film_terms()) {
-      KernelPair& pair = pairs.emplace_back(film_kernel(term, model.sigma, spacing.x(), reach.x()),
-                                            film_kernel(term, model.sigma, spacing.y(), reach.y()));
+      pairs.push_back({film_kernel(term, model.sigma, spacing.x(), reach.x()),
+                       film_kernel(term, model.sigma, spacing.y(), reach.y())});
+      const KernelPair& pair = pairs.back();
       mean += term.sign * mean_of(pair.x) * mean_of(pair.y);
       rise.x() += term.sign * rise_of(pair.x, spacing.x()) * mean_of(pair.y);
       rise.y() += term.sign * mean_of(pair.x) * rise_of(pair.y, spacing.y());

@@ -27,11 +27,11 @@
 #include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/picture_blur.h"
 #include "core/optics/outline.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
-#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 namespace {
@@ -44,7 +44,6 @@ constexpr double kLeakCell = 1.0;
 constexpr double kViewNodes = 240.0;
 
 constexpr double kMicrometres = 1e3;
-constexpr double kMmPerNm = 1e-6;
 
 /// A cut's first order of diffraction goes to λ / pitch from its rays; with its own width, this
 /// much farther.

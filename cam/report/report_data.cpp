@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/optics/picture_blur.h"
 #include "core/text/words.h"
-#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 

@@ -7,6 +7,7 @@
 #include "cam/report/verdict.h"
 #include "cam/tolerance/part_error.h"
 #include "core/io/lens_folder.h"
+#include "core/optics/picture_blur.h"
 #include "core/schema/json.h"
 #include "core/text/version.h"
 
@@ -15,7 +16,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kNmPerMm = 1e6;
 
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
@@ -277,7 +277,7 @@ json report_json(const ReportData& data) {
                        {"blur", list(data.blurs, blur)}};
     if (data.haze) report["light"]["haze"] = haze_json(*data.haze);
     if (data.waves) {
-      report["waves"] = {{"wavelength_nm", kNmPerMm * data.waves->wavelength},
+      report["waves"] = {{"wavelength_nm", data.waves->wavelength / kMmPerNm},
                          {"diffraction_mm", data.waves->width},
                          {"leakage", leakage_json(data, data.waves->result)},
                          {"surfaces", surfaces_json(data.waves->result)}};

@@ -31,7 +31,7 @@
 #include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/sandbox/child_work.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "core/text/version.h"
 
 namespace lensforge {

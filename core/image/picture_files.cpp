@@ -25,7 +25,6 @@
 #include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"
-#include "core/text/printable.h"
 #include "core/text/words.h"
 
 // The functions of lensforge-pictures.so: reading and writing of pictures, layers and heights.

@@ -28,7 +28,7 @@
 #include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/sandbox/child_work.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 // librsvg opens no file that a drawing refers to unless it knows the drawing's own address.
 // librsvg, libxml2, fontconfig and gdk-pixbuf are called only in a child process.

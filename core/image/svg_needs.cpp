@@ -18,7 +18,6 @@
 #include <vector>
 
 #include "core/image/svg_support.h"
-#include "core/text/printable.h"
 #include "core/text/words.h"
 
 namespace lensforge {

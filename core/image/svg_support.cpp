@@ -13,7 +13,6 @@
 #include <cstdlib>
 
 #include "core/error.h"
-#include "core/text/printable.h"
 #include "core/text/words.h"
 
 namespace lensforge {

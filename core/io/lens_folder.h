@@ -25,6 +25,7 @@ inline constexpr const char* kTargetExr = "target.exr";
 inline constexpr const char* kRenderPng = "render.png";
 inline constexpr const char* kRenderExr = "render.exr";
 inline constexpr const char* kRenderColor = "render_color.png";  ///< With a spectrum.
+inline constexpr const char* kWall = "wall.png";  ///< By waves, where the design followed them.
 inline constexpr const char* kError = "error.png";
 inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kOverview = "overview.png";
@@ -33,7 +34,7 @@ inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a desig
 
 /// All of them.
 inline constexpr std::array kAll = {kJson,      kSurface,   kSpline,    kSheet,       kFront,
-                                    kTargetPng, kTargetExr, kRenderPng, kRenderExr,   kRenderColor,
+                                    kTargetPng, kTargetExr, kRenderPng, kRenderExr,   kRenderColor, kWall,
                                     kError,     kOverview,  kSetup,     kConvergence, kCheckpoint};
 
 /// Temporary folder of old versions, left behind if one was killed.

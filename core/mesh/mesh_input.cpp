@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "core/mesh/mesh_readers.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 // What the readers share (mesh_readers.cpp has the formats): words, polygons and faces.
 namespace lensforge {

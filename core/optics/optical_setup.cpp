@@ -15,8 +15,8 @@
 #include "core/error.h"
 #include "core/image/color.h"
 #include "core/schema/description.h"
-#include "core/text/number_list.h"
 #include "core/text/number_text.h"
+#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 
 namespace lensforge {

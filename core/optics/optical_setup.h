@@ -260,6 +260,31 @@ struct LightColor {
 /// one colour: itself.
 std::vector<LightColor> light_colors(const OpticalSetup& setup);
 
+/// What a picture is computed of.
+enum class LightModel {
+  kAuto,  ///< Waves where they show: waves_show().
+  kRays,
+  kWaves,
+};
+
+/// mm per nm, the unit of wavelengths in options and files.
+inline constexpr double kMmPerNm = 1e-6;
+
+/// Wavelength of light that states none, mm; white light is as this.
+inline constexpr double kMiddleWavelength = 550.0 * kMmPerNm;
+
+/// Light as a scalar wave.
+struct WaveOptions {
+  double wavelength = kMiddleWavelength;  ///< In air, mm, > 0; of a setup without a spectrum.
+  /// Angle within which the surfaces scatter beside their rays, rad: λ / pitch for a tool's marks.
+  double scatter = 0.0;
+  /// Side of the tiles into which the lens is divided, and width over which neighbours overlap, in
+  /// lengths over which waves interfere: λ f / pixel, at least √(λ f). With 0 the lens is one
+  /// piece.
+  double tile = 24.0;
+  double overlap = 8.0;
+};
+
 /// What blurs a picture, and by how much.
 struct PictureBlur {
   std::string cause;    ///< "lamp", "diffraction", "polish" or "pitch".

@@ -11,6 +11,7 @@
 
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"
+#include "core/optics/picture_blur.h"
 
 namespace lensforge {
 namespace {
@@ -94,7 +95,6 @@ const std::vector<LineTerm>& film_over_gaussian_terms() {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kMmPerNm = 1e-6;
 constexpr double kMmPerMicrometre = 1e-3;
 
 /// Standard deviations after which a Gaussian ends: 2e-9 of it lie beyond.

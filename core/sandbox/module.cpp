@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/text/printable.h"
 #include "core/text/words.h"
 
 namespace lensforge {

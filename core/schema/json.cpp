@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -12,7 +12,6 @@
 #include "core/io/files.h"
 #include "core/schema/toml_document.h"
 #include "core/text/number_text.h"
-#include "core/text/printable.h"
 #include "core/text/words.h"
 
 namespace lensforge {

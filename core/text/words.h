@@ -65,4 +65,16 @@ inline std::vector<std::string_view> split(std::string_view text, char separator
 /// The known word that was most likely meant by a mistyped one; empty if none is near.
 std::string nearest_word(const std::string& word, const std::set<std::string>& known);
 
+/// Maximum length of a printed message, bytes: about ten lines of a terminal.
+inline constexpr std::size_t kMaxMessageBytes = 1000;
+
+/// Foreign text (file names, contents of files, replies of devices) as one line without effect on a
+/// terminal: white space becomes a space, every other control character (C0, DEL, C1) and every
+/// byte that is not UTF-8 becomes '?'. In a longer text " ... " replaces the middle, between
+/// characters. @pre max_bytes ≥ 16
+std::string printable_line(std::string_view text, std::size_t max_bytes = kMaxMessageBytes);
+
+/// printable_line() of each line of a text; none is cut.
+std::string printable_lines(std::string_view text);
+
 }  // namespace lensforge

@@ -98,8 +98,9 @@ struct ObjectiveOptions {
   SurfaceModel model = SurfaceModel::kFacet;
   int samples = 1;                ///< Splines only: rays per knot cell each way, ≥ 1.
   std::optional<MadeBy> made_by;  ///< Splines only: how the part is made; none: the spline itself.
-  double nu = 1.0;                ///< ν of the Welsch function, 1/mm, > 0.
-  AreaBarrier area{1e-6, 5e-6};   ///< mm²
+  std::optional<WaveOptions> waves;  ///< Splines only: the waves that make the picture; none: rays.
+  double nu = 1.0;                   ///< ν of the Welsch function, 1/mm, > 0.
+  AreaBarrier area{1e-6, 5e-6};      ///< mm²
   double surface_height = 0.0;  ///< Approximate height of the surface, mm, for the source's image.
 };
 
@@ -122,7 +123,8 @@ struct ObjectiveEvaluation {
 /// One iteration, a row of convergence.csv.
 struct ConvergenceRow {
   /// "transport": a Newton step; "update": a step of the correspondence-guided update; "render": a
-  /// step of rendering-guided optimisation; "spline": a step of a spline's optimisation.
+  /// step of rendering-guided optimisation; "spline": a step of a spline's optimisation; "waves": the
+  /// same by waves.
   std::string stage;
   int level = 0;
   int round = 0;

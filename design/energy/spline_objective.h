@@ -18,6 +18,45 @@
 
 namespace lensforge {
 
+/// Nodes of a spline, or of the surface that is made of it.
+template <class Exec>
+using SplinePart = std::variant<SplineNodesOn<Exec>, MadeNodes, ShiftedNodes>;
+
+/// One for the spline itself, or for every part that a design averages over (MadeBy::drawn()).
+/// @param size  of the lens, mm. @param samples  nodes per knot cell each way.
+template <class Exec>
+std::vector<SplinePart<Exec>> spline_parts(const GridShape& net, const Eigen::Vector2d& size,
+                                           int samples, const ObjectiveOptions& options,
+                                           const Exec& executor) {
+  std::vector<SplinePart<Exec>> parts;
+  if (!options.made_by) {
+    parts.push_back(spline_nodes_on(net, samples, executor));
+    return parts;
+  }
+  const double cell = std::sqrt(size.prod() / ((net.columns - 3.0) * (net.rows - 3.0)));
+  for (const MadeBy& made : options.made_by->drawn()) {
+    if (cell > kFineKnotCell * made.polish_sigma) {
+      parts.push_back(ShiftedNodes(net, size, samples, made, executor));
+    } else {
+      parts.push_back(MadeNodes(net, size, samples, made, executor));
+    }
+  }
+  return parts;
+}
+
+/// Makes a part's next nodes depend on these control points and those of the next look alone.
+/// @throw Interrupted.
+template <class Exec>
+void relinearize_part(const double* points, SplinePart<Exec>& part) {
+  if (auto* const made = std::get_if<MadeNodes>(&part)) made->forget();
+  if (auto* const made = std::get_if<ShiftedNodes>(&part)) made->measure(points);
+}
+
+template <class Exec>
+GridShape shape_of(const SplinePart<Exec>& part) {
+  return std::visit([](const auto& nodes) { return nodes.shape(); }, part);
+}
+
 /// DesignObjective as a function of a spline's control points: every node of the spline sends one
 /// ray by the spline's own normal. Barriers and goal are those of the mesh of the nodes; there are
 /// no smoothness terms. Same interface as DesignObjectiveOn.
@@ -34,14 +73,8 @@ class SplineObjectiveOn {
         core_(spline_nodes({net.grid, net.vertices}, options.samples).mesh, setup, goal, options,
               executor),
         unheld_(objective_detail::movable_coordinates(net.vertices, setup.lens_size)),
+        parts_(spline_parts(net.grid, setup.lens_size, options.samples, options, executor)),
         gradient_(static_cast<std::size_t>(net.vertices.size())) {
-    if (!options.made_by) {
-      parts_.push_back(spline_nodes_on(net.grid, options.samples, executor));
-    } else {
-      for (const MadeBy& part : options.made_by->drawn()) {
-        parts_.push_back(part_nodes(net.grid, setup.lens_size, options.samples, part));
-      }
-    }
     positions_ = Buffer(3 * static_cast<std::size_t>(node_count()));
     positions_bar_ = Buffer(positions_.size());
     if (setup.outline) {
@@ -55,10 +88,7 @@ class SplineObjectiveOn {
 
   /// @throw Interrupted.
   void relinearize(const double* points) {
-    for (Part& part : parts_) {
-      if (auto* const made = std::get_if<MadeNodes>(&part)) made->forget();
-      if (auto* const made = std::get_if<ShiftedNodes>(&part)) made->measure(points);
-    }
+    for (Part& part : parts_) relinearize_part(points, part);
     look(points, parts_.front());
     core_.relinearize(positions_.data());
     if (!bases_.empty()) hold(held_with_nodes());
@@ -90,17 +120,7 @@ class SplineObjectiveOn {
  private:
   using Buffer = typename Exec::template Buffer<double>;
 
-  /// Nodes of the spline, or of the made surface.
-  using Part = std::variant<SplineNodesOn<Exec>, MadeNodes, ShiftedNodes>;
-
-  [[nodiscard]] Part part_nodes(const GridShape& net, const Eigen::Vector2d& size, int samples,
-                                const MadeBy& made) const {
-    const double cell = std::sqrt(size.prod() / ((net.columns - 3.0) * (net.rows - 3.0)));
-    if (cell > kFineKnotCell * made.polish_sigma) {
-      return ShiftedNodes(net, size, samples, made, executor_);
-    }
-    return MadeNodes(net, size, samples, made, executor_);
-  }
+  using Part = SplinePart<Exec>;
 
   /// Sets the coordinates that may move.
   void hold(Eigen::Matrix3Xd movable) {
@@ -134,8 +154,7 @@ class SplineObjectiveOn {
   }
 
   [[nodiscard]] std::int64_t node_count() const {
-    const GridShape shape =
-        std::visit([](const auto& nodes) { return nodes.shape(); }, parts_.front());
+    const GridShape shape = shape_of(parts_.front());
     return std::int64_t{shape.columns} * shape.rows;
   }
 

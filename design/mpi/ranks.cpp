@@ -19,7 +19,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

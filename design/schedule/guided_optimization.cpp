@@ -12,6 +12,7 @@
 #include "core/compute/scalar.h"
 #include "core/optics/light_path.h"
 #include "design/energy/spline_objective.h"
+#include "design/energy/wave_objective.h"
 #include "design/flux/flux_triangle.h"
 #include "design/optimize/grid_preconditioner.h"
 #include "design/schedule/guided_stage_on.h"
@@ -84,6 +85,10 @@ std::unique_ptr<GuidedStage> make_stage(const SurfaceMesh& mesh, const OpticalSe
   const double aspect = cell_aspect(setup, mesh.grid);
   // A spline's stage works on the CPU, whatever the device.
   if (options.model == SurfaceModel::kSpline) {
+    if (options.waves) {
+      return std::make_unique<GuidedStageOn<Executor, WaveObjective>>(mesh, setup, aspect, goal,
+                                                                      options, executor);
+    }
     return std::make_unique<GuidedStageOn<Executor, SplineObjectiveOn<Executor>>>(
         mesh, setup, aspect, goal, options, executor);
   }
@@ -221,7 +226,8 @@ void GuidedOptimization::begin_preconditioner(const SurfaceMesh& mesh, Eigen::Ma
   stage_->set_symbols(xy_, z_);
 }
 
-StepScales GuidedOptimization::measure_scales(const SurfaceMesh& mesh, const RunControl& control) {
+StepScales GuidedOptimization::measured_scales(const SurfaceMesh& mesh, const RunControl& control) {
+  stage_->relinearize(mesh.vertices);
   Probes probes(*stage_, control);
   StepScales scales;
   begin_preconditioner(mesh, scales.reach);
@@ -235,14 +241,14 @@ StepScales GuidedOptimization::measure_scales(const SurfaceMesh& mesh, const Run
 LbfgsSummary GuidedOptimization::run(const LbfgsOptions& options, const Observer& observe,
                                      StepScales& scales, SurfaceMesh& mesh,
                                      const RunControl& control) {
-  stage_->relinearize(mesh.vertices);
   if (scales.known()) {
+    stage_->relinearize(mesh.vertices);
     xy_.scale = scales.xy;
     z_.scale = scales.z;
     stage_->set_reach(scales.reach);
     stage_->set_symbols(xy_, z_);
   } else {
-    scales = measure_scales(mesh, control);
+    scales = measured_scales(mesh, control);
   }
   control.report({"iterations", 0.0, 0.0, "first step"});
   return stage_->minimize(options, observe, mesh.vertices);

@@ -97,6 +97,9 @@ class GuidedOptimization {
     return run(options, observe, scales, mesh);
   }
 
+  /// Step lengths measured on the mesh. @param control  takes reports.
+  [[nodiscard]] StepScales measured_scales(const SurfaceMesh& mesh, const RunControl& control);
+
   /// The objective of the mesh, with Welsch weights taken from it; infinite if a barrier refuses
   /// it.
   [[nodiscard]] double value(const SurfaceMesh& mesh);
@@ -105,7 +108,6 @@ class GuidedOptimization {
   /// Reports the pictures from which curvatures are measured.
   class Probes;
 
-  [[nodiscard]] StepScales measure_scales(const SurfaceMesh& mesh, const RunControl& control);
   void calibrate(const Eigen::Matrix3Xd& vertices, Probes& probes);
   void begin_preconditioner(const SurfaceMesh& mesh, Eigen::Matrix3Xd& reach);
   void level_shifts(const Eigen::Matrix3Xd& vertices, Probes& probes, Eigen::Matrix3Xd& reach);

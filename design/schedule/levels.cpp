@@ -78,6 +78,11 @@ constexpr int kLongRounds = 2;
 constexpr int kMergedRounds = 3;
 constexpr double kMergedIterations = 0.8;
 
+/// By waves: iterations of a round, which an interruption loses, and of all rounds, as a share of
+/// the others'. A round that lowers the error by less than kIdleWaves is the last.
+constexpr int kWaveRound = 10;
+constexpr double kWaveIterations = 0.4;
+
 /// Merges every `merged` rounds into one, with `share` of their iterations in all.
 void merge_rounds(int merged, double share, Level& level) {
   const double iterations = share * level.rounds * level.iterations;
@@ -104,6 +109,15 @@ Level spline_level(const Level& mesh, const Eigen::Vector2d& size, const DesignO
     }
   }
   level.grid = {rounded(size.x() / cell, 1) + 3, rounded(size.y() / cell, 1) + 3};
+  return level;
+}
+
+/// The level after a spline's by rays.
+Level wave_level(const Level& spline, const DesignOptions& options) {
+  Level level = spline;
+  level.waves = true;
+  level.rounds = rounded(kWaveIterations * options.iterations / kWaveRound, 1);
+  level.iterations = kWaveRound;
   return level;
 }
 
@@ -158,6 +172,7 @@ std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOption
       level.iterations = rounded(std::min(1.0, share) * options.iterations, 1);
     }
     levels.push_back(spline_level(levels.back(), setup.lens_size, options));
+    if (follows_waves(options, setup)) levels.push_back(wave_level(levels.back(), options));
   }
   if (options.model != SurfaceModel::kFacet && options.transport_rounds <= 1) {
     for (Level& level : levels) {
@@ -201,6 +216,10 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.objective.model = task.options.model;
   problem.objective.nu = level.nu;
   problem.objective.surface_height = task.options.thickness;
+  if (level.waves) {
+    problem.objective.waves = wave_options(task.options, task.setup);
+    problem.aim = problem.target;
+  }
   if (level.spline) {
     // A spline is smooth by itself; barriers act on the triangles between its nodes.
     problem.objective.weights.smooth = 0.0;

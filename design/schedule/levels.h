@@ -24,6 +24,7 @@ struct Level {
   GridShape grid;                ///< Vertices of the mesh.
   double nu = 0.0;               ///< ν of the Welsch function, 1/mm.
   bool spline = false;           ///< The mesh's vertices are control points of a spline.
+  bool waves = false;            ///< Of a spline: the picture is that of a wave, not of rays.
   double knot_share = 1.0;  ///< Share of the vertices' displacement that its knots take part in.
   double least_area = kMinArea;  ///< Of a triangle, as a share of the mean (AreaBarrier).
   int rounds = 0;                ///< Alternations.
@@ -52,7 +53,8 @@ SurfaceModel default_model(const Eigen::Vector2i& pixels, const DesignOptions& o
 ///
 /// A spline is designed as a smooth mesh in fewer rounds. One more level then optimises the spline
 /// fitted to it, with two knot cells per cell of the mesh. For a process its cells are fine enough
-/// to undo the polish, and it is optimised longer.
+/// to undo the polish, and it is optimised longer. Where LightOptions::model asks for waves,
+/// a last level follows their picture from there.
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
 
 /// A design's input at full size; no step changes it.

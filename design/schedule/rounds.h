@@ -29,16 +29,21 @@ struct LevelSite {
 ///        or no surface to start from is allowed.
 bool run_round(const LevelSite& site, Checkpoint& state);
 
+/// A round that lowers the objective by less than this share counts as idle.
+inline constexpr double kIdleRound = 1e-3;
+
 /// Result of a round's two halves.
 struct RoundOutcome {
   const SurfaceMesh& before;
   double value = 0.0;        ///< Objective of the state's mesh.
   bool transported = false;  ///< It began with transport.
   bool rescaled = false;     ///< Its steps were measured anew.
+  /// Share by which it must lower the objective.
+  double idle = kIdleRound;
 };
 
 /// Keeps a round's mesh or the one before, whichever is better, and decides what is next. A round
-/// that lowers the objective by less than a thousandth has failed: if it began with transport, the
+/// that lowers the objective by less than it must has failed: if it began with transport, the
 /// level's further rounds do without; if its steps were scaled for an earlier surface, the next one
 /// measures them anew; if neither, the level ends.
 /// @param rounds  number of rounds of the level.

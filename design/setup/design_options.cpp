@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/optics/picture_blur.h"
 #include "core/text/number_text.h"
 #include "design/schedule/levels.h"
 #include "design/setup/option_tables.h"
@@ -36,6 +37,16 @@ void require_process(const DesignOptions& o) {
   if (o.model != SurfaceModel::kSpline) {
     throw InputError("--made-by: needs --model spline, not " + model_name(o.model));
   }
+}
+
+/// @throw InputError unless waves can be followed, or need not be.
+void require_waves(const DesignOptions& o) {
+  if (o.light.model == LightModel::kWaves && o.model != SurfaceModel::kSpline) {
+    throw InputError("--light-model waves: needs --model spline, not " + model_name(o.model));
+  }
+  if (o.light.spectrum.none() || o.light.wavelength_nm == LightOptions().wavelength_nm) return;
+  require(false, "--wavelength", o.light.wavelength_nm,
+          "--wavelengths already gives those of the light");
 }
 
 /// @throw InputError naming the finest polish that can be computed for a lens of this size.
@@ -85,11 +96,27 @@ DesignOptions with_smoothness_applied(DesignOptions options) {
   return options;
 }
 
+bool follows_waves(const DesignOptions& options, const OpticalSetup& setup) {
+  if (options.light.model == LightModel::kRays || options.model != SurfaceModel::kSpline) {
+    return false;
+  }
+  const double wavelength = wave_options(options, setup).wavelength;
+  return options.light.model == LightModel::kWaves ||
+         waves_show(light_blurs(setup, options.thickness, wavelength));
+}
+
+WaveOptions wave_options(const DesignOptions& options, const OpticalSetup& setup) {
+  WaveOptions waves;
+  waves.wavelength = middle_wavelength(setup, kMmPerNm * options.light.wavelength_nm);
+  return waves;
+}
+
 void validate(const DesignOptions& options, const Image& target) {
   const int longer = std::max(target.columns(), target.rows());
   require(longer >= kMinPixels, "the picture's longer side", longer, "must be at least 4 pixels");
   require_all_in_range(options);
   require_process(options);
+  require_waves(options);
   require(longer >= options.pixels, "--pixels", options.pixels,
           "the picture's longer side has only " + std::to_string(longer) + " pixels");
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);

@@ -53,7 +53,10 @@ struct LightOptions {
   SourceShape source_shape;  ///< Shape of a source with an angle or a size.
   bool fresnel = false;      ///< Count the light that a lens's faces reflect.
   Spectrum spectrum;         ///< Colours of the light; none: DesignOptions::ior for all.
-  double image_width = 0.0;  ///< Width of the picture on the screen, mm; 0: the lens's.
+  /// What the last steps of a spline follow: rays, or the picture of a wave.
+  LightModel model = LightModel::kRays;
+  double wavelength_nm = 550.0;  ///< Of waves, without a spectrum.
+  double image_width = 0.0;      ///< Width of the picture on the screen, mm; 0: the lens's.
   /// Offset of the picture's centre from the point where a flat surface's chief ray meets the
   /// screen, mm along the lens's x and y.
   Eigen::Vector2d image_offset{0.0, 0.0};
@@ -148,6 +151,13 @@ std::shared_ptr<const HeightSpline> front_from(const std::string& file, const Ru
 /// centre is the point where the light from the middle of a flat surface at height `thickness`
 /// meets z = focal_length, moved by image_offset. @pre require_light().
 OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels);
+
+/// True if a design's last steps follow waves: as asked, or with kAuto for a spline where
+/// waves_show().
+bool follows_waves(const DesignOptions& options, const OpticalSetup& setup);
+
+/// The waves of a design.
+WaveOptions wave_options(const DesignOptions& options, const OpticalSetup& setup);
 
 /// The same setup with the picture's centre moved along that light to another z.
 OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thickness);

@@ -19,8 +19,8 @@
 #include "core/optics/front.h"
 #include "core/optics/light_path.h"
 #include "core/optics/light_source.h"
-#include "core/text/number_list.h"
 #include "core/text/number_text.h"
+#include "core/text/read_numbers.h"
 #include "design/setup/design_options.h"
 
 namespace lensforge {

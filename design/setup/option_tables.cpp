@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/optics/optical_setup.h"
-#include "core/text/number_list.h"
 #include "core/text/number_text.h"
-#include "core/text/units.h"
+#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"
@@ -169,6 +169,14 @@ void describe(Description& d, LightOptions& o) {
   describe_pair(d, "--screen-tilt", o.screen_tilt, "AX,AY",
                 "degrees that the screen is turned by the right-hand rule about the picture's "
                 "right, then about its up, as the viewer sees it");
+  d.word(
+      "--light-model", o.model,
+      {{"rays", LightModel::kRays}, {"waves", LightModel::kWaves}, {"auto", LightModel::kAuto}},
+      "what a spline's last steps follow: rays; or, minutes longer, the picture that light makes "
+      "as a wave, which errs by half as much afterwards; auto takes waves unless the lamp blurs "
+      "more than they do");
+  d.number("--wavelength", o.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength), "nm",
+           "of the wave, for --light-model; white light is as 550");
 }
 
 void describe(Description& d, ObjectiveWeights& w) {

@@ -15,7 +15,7 @@
 #include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"
-#include "core/text/units.h"
+#include "core/text/read_numbers.h"
 #include "design/setup/design_options.h"
 
 namespace lensforge {

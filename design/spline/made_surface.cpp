@@ -326,6 +326,21 @@ SurfacePoint MadeSurface::at(const Eigen::Vector2d& xy) const {
   return made;
 }
 
+void MadeField::sample(const GridWindow& window, const Executor& executor,
+                       SurfacePatch& patch) const {
+  resize_patch(window, false, patch);
+  const auto sample_row = [&](std::int64_t j) {
+    for (std::int64_t i = 0; i < window.columns; ++i) {
+      const auto n = static_cast<std::size_t>(j * window.columns + i);
+      const SurfacePoint point = surface_.at(window.node(i, j));
+      patch.z[n] = point.z;
+      patch.slope_x[n] = point.slope.x();
+      patch.slope_y[n] = point.slope.y();
+    }
+  };
+  parallel_for(executor, "made surface", window.rows, sample_row, 4);
+}
+
 SampledSurface made_nodes(const ControlNet& net, const MadeBy& made, int samples,
                           const Executor& executor) {
   SampledSurface nodes = spline_nodes(net, samples);

@@ -10,6 +10,7 @@
 
 #include "core/compute/executor.h"
 #include "core/lens/optical_surface.h"
+#include "core/lens/surface_field.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/spline/control_net.h"
 #include "design/flux/columns.h"
@@ -150,6 +151,20 @@ class MadeSurface {
   ControlNet net_;  ///< Empty without a floor.
   AveragingGrid grid_;
   Eigen::MatrixXd heights_;  ///< AveragingGrid::make_heights(), then filtered()
+};
+
+/// The made surface, to be sampled.
+class MadeField final : public SurfaceField {
+ public:
+  /// @pre, @throw as MadeSurface.
+  MadeField(const ControlNet& net, const MadeBy& made, const Executor& executor)
+      : surface_(net, made, executor) {}
+
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+ private:
+  MadeSurface surface_;
 };
 
 /// The made surface above the nodes of its spline, spline_nodes().

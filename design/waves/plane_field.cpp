@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/optics/light_path.h"
-#include "design/waves/wave_picture.h"
+#include "design/waves/wave_tile.h"
 
 namespace lensforge {
 namespace {
@@ -134,19 +134,25 @@ class LaidTriangle {
     return inside;
   }
 
-  /// Amplitude and phase ÷ 2π of the field at a node, inside or near it. Linear interpolation of
-  /// the path errs by as much to one side as the mean of the vertices' tangent planes does to the
-  /// other.
-  [[nodiscard]] std::pair<double, double> field(double x, double y) const {
-    double turns = 0.0;
+  struct Field {
     double amplitude = 0.0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double share = sides_[k].at(x, y);
-      turns += share * turns_[k].at(x, y);
-      amplitude += share * amplitude_[k];
-    }
+    double turns = 0.0;             ///< Phase ÷ 2π.
+    std::array<double, 3> share{};  ///< Of the vertices.
+  };
+
+  /// The field at a node, inside or near it. Linear interpolation of the path errs by as much to
+  /// one side as the mean of the vertices' tangent planes does to the other.
+  [[nodiscard]] Field field(double x, double y) const {
+    Field field;
     const double scale = 1.0 / std::abs(doubled_);
-    return {scale * std::max(amplitude, 0.0), scale * turns - (doubled_ < 0.0 ? 0.25 : 0.0)};
+    for (std::size_t k = 0; k < 3; ++k) {
+      field.share[k] = scale * sides_[k].at(x, y);
+      field.turns += field.share[k] * turns_[k].at(x, y);
+      field.amplitude += field.share[k] * amplitude_[k];
+    }
+    field.amplitude = std::max(field.amplitude, 0.0);
+    if (doubled_ < 0.0) field.turns -= 0.25;
+    return field;
   }
 
  private:
@@ -185,7 +191,8 @@ PlaneField::PlaneField(const FieldPlan& plan)
     : plan_(plan),
       values_(static_cast<std::size_t>(plan.columns) * static_cast<std::size_t>(plan.rows)) {}
 
-void PlaneField::add(const std::array<Vertex, 3>& vertices) {
+template <class Take>
+void PlaneField::for_each_node(const std::array<Vertex, 3>& vertices, const Take& take) const {
   const LaidTriangle triangle(plan_, vertices);
   if (triangle.is_empty()) return;
   // The nodes whose cells the triangle meets.
@@ -200,14 +207,21 @@ void PlaneField::add(const std::array<Vertex, 3>& vertices) {
     for (int i = from.x(); i <= to.x(); ++i) {
       const int inside = triangle.points_inside(plan_.points, i, j);
       if (inside == 0) continue;
-      const auto [amplitude, turns] = triangle.field(i, j);
-      pending_.node.push_back(static_cast<std::size_t>(j) *
-                                  static_cast<std::size_t>(plan_.columns) +
-                              static_cast<std::size_t>(i));
-      pending_.turns.push_back(turns);
-      pending_.amplitude.push_back(static_cast<float>(weight * inside * amplitude));
+      LaidTriangle::Field field = triangle.field(i, j);
+      field.amplitude *= weight * inside;
+      take(static_cast<std::size_t>(j) * static_cast<std::size_t>(plan_.columns) +
+               static_cast<std::size_t>(i),
+           field);
     }
   }
+}
+
+void PlaneField::add(const std::array<Vertex, 3>& vertices) {
+  for_each_node(vertices, [&](std::size_t node, const LaidTriangle::Field& field) {
+    pending_.node.push_back(node);
+    pending_.turns.push_back(field.turns);
+    pending_.amplitude.push_back(static_cast<float>(field.amplitude));
+  });
   if (pending_.node.size() >= kPending) lay_rest();
 }
 
@@ -217,15 +231,45 @@ void PlaneField::lay_rest() {
   for (std::size_t k = 0; k < pending_.node.size(); ++k) {
     values_[pending_.node[k]] += pending_.amplitude[k] * phases[k];
   }
-  pending_.node.clear();
-  pending_.turns.clear();
-  pending_.amplitude.clear();
+  pending_.clear();
 }
 
-/// A component of the spectrum with the direction p turns by k D √(1 − |p|²), without what the mean
-/// ray's turns by and without the shift of the nodes to far_centre().
+void PlaneField::gather(const std::array<Vertex, 3>& vertices,
+                        const std::array<std::size_t, 3>& vertex, std::span<double> by_path) {
+  for_each_node(vertices, [&](std::size_t node, const LaidTriangle::Field& field) {
+    pending_.node.push_back(node);
+    pending_.turns.push_back(field.turns);
+    pending_.amplitude.push_back(static_cast<float>(field.amplitude));
+    pending_.vertex.push_back(vertex);
+    pending_.share.push_back(field.share);
+  });
+  if (pending_.node.size() >= kPending) gather_rest(by_path);
+}
+
+void PlaneField::gather_rest(std::span<double> by_path) {
+  UnitPhases phases;
+  phases.find(pending_.turns);
+  const double wave_number = kTwoPi / plan_.wavelength;
+  for (std::size_t k = 0; k < pending_.node.size(); ++k) {
+    const std::complex<float> laid = pending_.amplitude[k] * phases[k];
+    const double by_phase = (values_[pending_.node[k]] * std::conj(laid)).imag();
+    for (std::size_t n = 0; n < 3; ++n) {
+      by_path[pending_.vertex[k][n]] += wave_number * by_phase * pending_.share[k][n];
+    }
+  }
+  pending_.clear();
+}
+
 void PlaneField::propagate() {
   lay_rest();
+  go(false);
+}
+
+void PlaneField::return_back() { go(true); }
+
+/// A component of the spectrum with the direction p turns by k D √(1 − |p|²), without what the mean
+/// ray's turns by and without the shift of the nodes to far_centre(); the adjoint turns it back.
+void PlaneField::go(bool back) {
   transform(values_, plan_.columns, plan_.rows, FFTW_FORWARD);
   const Eigen::Vector2d slope = plan_.slope();
   const double root = std::sqrt(1.0 - plan_.cosine.squaredNorm());
@@ -259,6 +303,9 @@ void PlaneField::propagate() {
       turns[i] = wavelengths * (longer + slope.x() * more_x[i] + slope.y() * more_y);
       kept[i] = keep ? static_cast<float>(scale) : 0.0F;
     }
+    if (back) {
+      for (double& turn : turns) turn = -turn;
+    }
     phases.find(turns);
     std::complex<float>* const row = &at(0, j);
     for (std::size_t i = 0; i < columns; ++i) row[i] *= kept[i] * phases[i];
@@ -266,58 +313,114 @@ void PlaneField::propagate() {
   transform(values_, plan_.columns, plan_.rows, FFTW_BACKWARD);
 }
 
+namespace {
+
+/// How a field's nodes lie on pixels: each has a cell that is spread over those it touches.
+class NodesOnPixels {
+ public:
+  NodesOnPixels(const FieldPlan& plan, const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
+                const Eigen::Vector2i& pixels)
+      : by_node_(by_mm * plan.step.asDiagonal()),
+        origin_(centre - by_node_ * plan.middle()),
+        cell_(by_node_.cwiseAbs().rowwise().sum()) {
+    const Eigen::Vector2d half =
+        0.5 * by_node_.cwiseAbs() * Eigen::Vector2d(plan.columns, plan.rows) + cell_;
+    low = (centre - half).array().floor().cast<int>().max(0);
+    high = (centre + half).array().ceil().cast<int>().min(pixels.array());
+  }
+
+  Eigen::Vector2i low;   ///< First pixel.
+  Eigen::Vector2i high;  ///< One past the last.
+
+  [[nodiscard]] bool none() const { return low.x() >= high.x() || low.y() >= high.y(); }
+  [[nodiscard]] int columns() const { return high.x() - low.x(); }
+
+  /// Calls `take(number, share)` for the pixels that a node's cell touches; numbers count from
+  /// `low`, row by row.
+  template <class Take>
+  void for_each_pixel(int i, int j, const Take& take) const {
+    // Most cells touch one pixel.
+    const Eigen::Vector2d from = origin_ + by_node_ * Eigen::Vector2d(i, j) - 0.5 * cell_;
+    const Eigen::Vector2d to = from + cell_;
+    const Eigen::Vector2d pixel = from.array().floor();
+    if ((to.array() < pixel.array() + 1.0).all()) {
+      const Eigen::Vector2i at = pixel.cast<int>();
+      if ((at.array() >= low.array()).all() && (at.array() < high.array()).all()) {
+        take(number(at.x(), at.y()), 1.0);
+      }
+      return;
+    }
+    touched(1, from.y(), to.y(), [&](int row, double of_row) {
+      touched(0, from.x(), to.x(),
+              [&](int column, double of_column) { take(number(column, row), of_row * of_column); });
+    });
+  }
+
+ private:
+  [[nodiscard]] std::size_t number(int column, int row) const {
+    return static_cast<std::size_t>(row - low.y()) * static_cast<std::size_t>(columns()) +
+           static_cast<std::size_t>(column - low.x());
+  }
+
+  /// Pixels that a cell touches along one axis, and its share in each.
+  template <class Take>
+  void touched(int axis, double from, double to, const Take& take) const {
+    for (int pixel = std::max(low[axis], static_cast<int>(std::floor(from)));
+         pixel < high[axis] && pixel < to; ++pixel) {
+      const double share =
+          (std::min(to, pixel + 1.0) - std::max(from, double(pixel))) / cell_[axis];
+      if (share > 0.0) take(pixel, share);
+    }
+  }
+
+  Eigen::Matrix2d by_node_;
+  Eigen::Vector2d origin_;  ///< Of the first node, pixel coordinates.
+  Eigen::Vector2d cell_;    ///< Pixels.
+};
+
+}  // namespace
+
 PixelLight PlaneField::spread(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
                               const Eigen::Vector2i& pixels) const {
-  const Eigen::Matrix2d by_node = by_mm * plan_.step.asDiagonal();
-  const Eigen::Vector2d cell = by_node.cwiseAbs().rowwise().sum();
-  const Eigen::Vector2d half =
-      0.5 * by_node.cwiseAbs() * Eigen::Vector2d(plan_.columns, plan_.rows) + cell;
+  const NodesOnPixels on(plan_, centre, by_mm, pixels);
   PixelLight result;
-  const Eigen::Vector2i low = (centre - half).array().floor().cast<int>().max(0);
-  const Eigen::Vector2i high = (centre + half).array().ceil().cast<int>().min(pixels.array());
-  if (low.x() >= high.x() || low.y() >= high.y()) return result;
-  result.first = low;
-  result.columns = high.x() - low.x();
-  result.rows = high.y() - low.y();
+  if (on.none()) return result;
+  result.first = on.low;
+  result.columns = on.columns();
+  result.rows = on.high.y() - on.low.y();
   result.light.assign(
       static_cast<std::size_t>(result.columns) * static_cast<std::size_t>(result.rows), 0.0);
   const double area = plan_.step.prod();
-  /// Pixels that a cell touches along one axis, and its share in each.
-  const auto touched = [&](int axis, double at, const auto& take) {
-    const double from = at - 0.5 * cell[axis];
-    const double to = at + 0.5 * cell[axis];
-    for (int pixel = std::max(low[axis], static_cast<int>(std::floor(from)));
-         pixel < high[axis] && pixel < to; ++pixel) {
-      const double share = (std::min(to, pixel + 1.0) - std::max(from, double(pixel))) / cell[axis];
-      if (share > 0.0) take(pixel - low[axis], share);
-    }
-  };
   for (int j = 0; j < plan_.rows; ++j) {
     for (int i = 0; i < plan_.columns; ++i) {
       const double light = static_cast<double>(std::norm(at(i, j))) * area;
       if (light == 0.0) continue;
-      const Eigen::Vector2d place = centre + by_node * (Eigen::Vector2d(i, j) - plan_.middle());
-      // Most cells touch one pixel.
-      const Eigen::Vector2d from = place - 0.5 * cell - low.cast<double>();
-      if (from.minCoeff() >= 0.0) {
-        const auto column = static_cast<int>(from.x());
-        const auto row = static_cast<int>(from.y());
-        if (from.x() + cell.x() < column + 1 && from.y() + cell.y() < row + 1 &&
-            column < result.columns && row < result.rows) {
-          result.light[static_cast<std::size_t>(row) * static_cast<std::size_t>(result.columns) +
-                       static_cast<std::size_t>(column)] += light;
-          continue;
-        }
-      }
-      touched(1, place.y(), [&](int row, double of_row) {
-        touched(0, place.x(), [&](int column, double of_column) {
-          result.light[static_cast<std::size_t>(row) * static_cast<std::size_t>(result.columns) +
-                       static_cast<std::size_t>(column)] += light * of_row * of_column;
-        });
-      });
+      on.for_each_pixel(
+          i, j, [&](std::size_t pixel, double share) { result.light[pixel] += share * light; });
     }
   }
   return result;
+}
+
+void PlaneField::pull(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
+                      const Eigen::Vector2i& pixels, std::span<const double> by_pixel) {
+  const NodesOnPixels on(plan_, centre, by_mm, pixels);
+  std::vector<double> bars;
+  for (int row = on.low.y(); row < on.high.y(); ++row) {
+    const auto first = by_pixel.begin() + std::ptrdiff_t{row} * pixels.x();
+    if (!on.none()) bars.insert(bars.end(), first + on.low.x(), first + on.high.x());
+  }
+  const double doubled_area = 2.0 * plan_.step.prod();
+  for (int j = 0; j < plan_.rows; ++j) {
+    for (int i = 0; i < plan_.columns; ++i) {
+      double bar = 0.0;
+      if (!on.none()) {
+        on.for_each_pixel(i, j,
+                          [&](std::size_t pixel, double share) { bar += share * bars[pixel]; });
+      }
+      at(i, j) *= static_cast<float>(doubled_area * bar);
+    }
+  }
 }
 
 }  // namespace lensforge

@@ -27,7 +27,7 @@
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/schema/json.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "core/text/version.h"
 
 namespace lensforge {

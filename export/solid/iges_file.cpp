@@ -18,7 +18,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "export/solid/opencascade_io.h"
 #include "export/solid/solids_module.h"
 

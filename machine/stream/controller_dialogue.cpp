@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "machine/stream/program_feed.h"
 #include "machine/stream/reply_parser.h"
 

@@ -19,7 +19,7 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge::journal_text {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "machine/stream/reply_parser.h"
 
 namespace lensforge {

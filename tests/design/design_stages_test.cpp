@@ -130,6 +130,21 @@ TEST_P(SplineStage, StoppedInTheSplineAndResumedGivesTheSameBits) {
 }
 
 /// Before the spline's level a design is a smooth mesh, and its lens says so.
+/// Its last level follows waves.
+TEST_P(SplineStage, StoppedInTheWavesAndResumedGivesTheSameBits) {
+  options_.light.model = LightModel::kWaves;
+  options_.width = 4.0;
+  options_.focal_length = 75.0;
+  options_.pixels = 20;
+  options_.iterations = 60;
+  const DesignResult whole = design(Executor::cpu(2));
+  EXPECT_EQ(whole.convergence.back().stage, "waves");
+  EXPECT_GT(whole.convergence.back().round, 0);
+  ASSERT_TRUE(whole.wall);
+  EXPECT_TRUE(expect_resumed_equals(whole, "waves adjoint", 14));
+  EXPECT_TRUE(expect_resumed_equals(whole, "waves adjoint", 3));
+}
+
 TEST_P(SplineStage, StoppedBeforeTheSplineIsASmoothLens) {
   StopAtKernel stop("image term", 1);
   options_.iterations = 100;

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"
 #include "export/sample_surfaces.h"

@@ -27,7 +27,8 @@ PictureErrors picture_errors(const Traced& traced, const Picture& target, int ri
   double count = 0.0;
   for (int row = rim; row < target.rows - rim; ++row) {
     for (int column = rim; column < target.columns - rim; ++column) {
-      const auto i = static_cast<std::size_t>(row * target.columns + column);
+      const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(target.columns) +
+                     static_cast<std::size_t>(column);
       const double light = traced.picture.light()[i] / traced.whole * total;
       errors.mae += std::abs(shown(light) - shown(target.light[i]));
       errors.linear += std::abs(light - target.light[i]) / largest;

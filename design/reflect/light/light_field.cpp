@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/text/number_list.h"
+#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "design/reflect/input.h"
 #include "design/reflect/mesh/faces.h"

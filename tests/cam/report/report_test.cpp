@@ -183,7 +183,8 @@ TEST(Report, NumbersOfRingsStayOnTheMap) {
   LeakPlace place = data.places.front();
   data.places.clear();
   for (int k = 0; k < 12; ++k) {
-    place.place = {10.0 * (k % 4), 10.0 * (k / 4)};
+    const int row = k / 4;
+    place.place = {10.0 * (k % 4), 10.0 * row};
     place.side = k == 5 ? 4.0 : 0.2;
     data.places.push_back(place);
   }

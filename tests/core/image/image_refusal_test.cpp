@@ -28,7 +28,7 @@
 #include "core/sample_files.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/text/number_list.h"
+#include "core/text/read_numbers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

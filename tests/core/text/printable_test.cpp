@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/text/printable.h"
+#include "core/text/words.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <complex>
 #include <numbers>
 
-#include "design/waves/wave_picture.h"
+#include "design/waves/wave_tile.h"
 
 namespace lensforge {
 namespace {

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/compute/executor.h"
+#include "core/lens/surface_field.h"
+#include "core/optics/light_path.h"
+#include "core/optics/outline.h"
+#include "core/optics/screen.h"
+#include "design/waves/wave_picture.h"
+
+// Notation: q a ray's place on the starting plane, W its optical path up to there, p its direction
+// cosines along x and y, m = p / √(1 − |p|²) its slope; p0 and m0 those of the tile's mean ray. A
+// bar is ∂E/∂.
+
+namespace lensforge {
+
+// How a field goes from one plane to another, tile by tile.
+
+/// A field on a plane z = const and its way to a parallel one.
+struct FieldPlan {
+  double wavelength = 550e-6;        ///< mm
+  double distance = 0.0;             ///< Between the planes, mm, > 0.
+  Eigen::Vector2d centre{0.0, 0.0};  ///< Of the first plane's nodes, mm.
+  Eigen::Vector2d cosine{0.0, 0.0};  ///< Direction of the mean ray, along x and y.
+  Eigen::Vector2d step{0.0, 0.0};    ///< Of the nodes, mm.
+  int columns = 0, rows = 0;
+  /// Components that go farther aside than this on their way are dropped, mm: they would come back
+  /// on the other side of the nodes.
+  Eigen::Vector2d reach{HUGE_VAL, HUGE_VAL};
+  /// Points along x and y by which a node's cell is known to be lit: more than one where the field
+  /// has a hard edge across that axis.
+  Eigen::Vector2i points{1, 1};
+
+  /// Column and row of the centre.
+  [[nodiscard]] Eigen::Vector2i centre_node() const { return Eigen::Vector2i(columns, rows) / 2; }
+  [[nodiscard]] Eigen::Vector2d middle() const { return centre_node().cast<double>(); }
+  [[nodiscard]] Eigen::Vector2d slope() const {
+    return cosine / std::sqrt(1.0 - cosine.squaredNorm());
+  }
+  /// Where the mean ray from the centre meets the other plane, mm.
+  [[nodiscard]] Eigen::Vector2d far_centre() const { return centre + distance * slope(); }
+};
+
+/// The next size of 2, 3, 5 and 7 from `least` up, even: fast to transform.
+int transform_size(double least);
+
+/// Light of a rectangle of pixels.
+struct PixelLight {
+  Eigen::Vector2i first{0, 0};  ///< Column and row.
+  int columns = 0, rows = 0;
+  std::vector<double> light;  ///< Row by row.
+  double whole = 0.0;         ///< All that the field has, on these pixels or not.
+  /// Light that came as rays: pixels of the picture, row by row, and shares.
+  std::vector<std::pair<int, double>> rays;
+};
+
+/// A scalar field without the phase of its mean ray, on as many nodes as its steepest rays ask for.
+/// Phases are found in double precision, values kept in single: 1e-7 of the field.
+class PlaneField {
+ public:
+  /// A ray on the plane.
+  struct Vertex {
+    Eigen::Vector2d place;   ///< mm
+    Eigen::Vector2d cosine;  ///< Direction along x and y.
+    double path = 0.0;       ///< Optical, mm.
+    double amplitude = 0.0;  ///< √(light per mm²)
+  };
+
+  explicit PlaneField(const FieldPlan& plan);
+
+  /// Adds the field of a triangle of neighbouring rays at the nodes of which a point is inside it,
+  /// at the latest when the field is propagated or lay_rest() is called.
+  /// The path is the quadratic through the vertices with their directions as slopes; a triangle
+  /// that is turned over is beyond a fold, where the phase is π/2 less. Points on a common side of
+  /// two triangles belong to one of them.
+  void add(const std::array<Vertex, 3>& vertices);
+  void lay_rest();
+
+  /// Goes to the other plane by the angular spectrum: nodes are then around far_centre().
+  void propagate();
+
+  /// Adjoint of spread(): a field on the other plane becomes the derivative 2 ∂E/∂|U|² · U.
+  /// @param by_pixel  derivatives by the light of all pixels, row by row.
+  void pull(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
+            const Eigen::Vector2i& pixels, std::span<const double> by_pixel);
+  /// Adjoint of propagate().
+  void return_back();
+  /// Adjoint of add() by the paths of the vertices, on the field of return_back(): adds
+  /// 2π/λ · Im(Ū U*) of the nodes, U what the triangle laid there, at the latest when
+  /// gather_rest() is called.
+  /// @param vertex  index of each in `by_path`.
+  void gather(const std::array<Vertex, 3>& vertices, const std::array<std::size_t, 3>& vertex,
+              std::span<double> by_path);
+  void gather_rest(std::span<double> by_path);
+
+  /// Light of the nodes on pixels, each spread evenly over its cell.
+  /// @param centre  pixel coordinates of the plane's centre. @param by_mm  their derivatives.
+  [[nodiscard]] PixelLight spread(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
+                                  const Eigen::Vector2i& pixels) const;
+
+  [[nodiscard]] const FieldPlan& plan() const { return plan_; }
+  [[nodiscard]] double bytes() const {
+    return static_cast<double>(values_.size() * sizeof(values_[0]));
+  }
+  /// Node (i, j), (0, 0) the lowest.
+  [[nodiscard]] const std::complex<float>& at(int i, int j) const {
+    return values_[static_cast<std::size_t>(j) * static_cast<std::size_t>(plan_.columns) +
+                   static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] std::complex<float>& at(int i, int j) {
+    return values_[static_cast<std::size_t>(j) * static_cast<std::size_t>(plan_.columns) +
+                   static_cast<std::size_t>(i)];
+  }
+
+ private:
+  /// Nodes to lay or gather at once.
+  struct Pending {
+    std::vector<std::size_t> node;
+    std::vector<double> turns;  ///< Phase ÷ 2π.
+    std::vector<float> amplitude;
+    // To gather alone.
+    std::vector<std::array<std::size_t, 3>> vertex;
+    std::vector<std::array<double, 3>> share;  ///< Of the vertices in the node's path.
+
+    void clear() {
+      node.clear();
+      turns.clear();
+      amplitude.clear();
+      vertex.clear();
+      share.clear();
+    }
+  };
+
+  /// Calls `take(node, turns, amplitude, shares)` for the nodes that a triangle lays.
+  template <class Take>
+  void for_each_node(const std::array<Vertex, 3>& vertices, const Take& take) const;
+  void go(bool back);
+
+  FieldPlan plan_;
+  std::vector<std::complex<float>> values_;
+  Pending pending_;
+};
+
+/// A stretch of one axis of the grid, in cells, with a window that rises at its begin and falls at
+/// its end.
+struct Stretch {
+  std::int64_t begin, end;
+  std::int64_t rise, fall;  ///< Widths of the ramps; 0 at the lens's rim.
+
+  [[nodiscard]] std::int64_t nodes() const { return end - begin + 1; }
+  /// Squares of neighbours' windows sum to 1.
+  [[nodiscard]] double window(std::int64_t node) const {
+    const auto ramp = [](std::int64_t from_end, std::int64_t width) {
+      if (from_end >= width) return 1.0;
+      return std::sin(0.5 * std::numbers::pi * static_cast<double>(from_end) /
+                      static_cast<double>(width));
+    };
+    return ramp(node - begin, rise) * ramp(end - node, fall);
+  }
+  /// Width of the ramps between its halves.
+  [[nodiscard]] std::int64_t middle_ramp() const {
+    const std::int64_t middle = (begin + end) / 2;
+    return std::min(middle - begin - rise, end - fall - middle) / 2;
+  }
+  /// Both halves; their windows' squares sum to that of the whole. @pre middle_ramp() > 0.
+  [[nodiscard]] std::array<Stretch, 2> halves() const {
+    const std::int64_t ramp = middle_ramp();
+    const std::int64_t second = (begin + end) / 2 - ramp / 2;
+    return {Stretch{begin, second + ramp, rise, ramp}, Stretch{second, end, ramp, fall}};
+  }
+};
+
+struct Tile {
+  Stretch x, y;
+
+  [[nodiscard]] CellRange cells() const {
+    return {x.begin, y.begin, x.end - x.begin, y.end - y.begin};
+  }
+};
+
+/// Nodes of a surface, row by row: a rectangle of a grid that need not be even.
+struct SurfaceNodes {
+  std::int64_t columns = 0;
+  std::int64_t first_column = 0, first_row = 0;  ///< Of the rectangle, in the grid.
+  Eigen::Vector2d spacing{0.0, 0.0};             ///< Mean distance of neighbours, mm.
+  std::vector<Eigen::Vector3d> place;            ///< mm
+  std::vector<Eigen::Vector2d> slope;            ///< ∂z/∂x, ∂z/∂y
+
+  /// Number of the grid's node (column, row) here.
+  [[nodiscard]] std::size_t at(std::int64_t column, std::int64_t row) const {
+    return static_cast<std::size_t>((row - first_row) * columns + column - first_column);
+  }
+};
+
+/// Optical path from the lamp to points of the surface, but for a constant of parallel light, mm.
+class LampPath {
+ public:
+  explicit LampPath(const OpticalSetup& setup)
+      : index_(traits(setup.body).transmits ? setup.ior : 1.0), place_(lamp_place(setup.lamp)) {
+    const auto* const parallel = std::get_if<ParallelLight>(&setup.lamp);
+    if (parallel == nullptr) return;
+    before_ = parallel->direction;
+    inside_ = before_;
+    if (index_ == 1.0) return;
+    inside_.head<2>() /= index_;
+    inside_.z() = std::sqrt(1.0 - inside_.head<2>().squaredNorm());
+  }
+
+  /// @param ray  to the point; null for parallel light that enters through a plane.
+  [[nodiscard]] double to(const Eigen::Vector3d& p, const IncidentRay* ray) const {
+    if (ray == nullptr) return index_ * inside_.dot(p);
+    const Eigen::Vector3d entry = ray->entry();
+    const double before = place_ ? (entry - *place_).norm() : before_.dot(entry);
+    return before + index_ * (p - entry).norm();
+  }
+  /// Derivative of to() by the point's height.
+  [[nodiscard]] double rise(const Eigen::Vector3d& p, const IncidentRay* ray) const {
+    if (ray == nullptr) return index_ * inside_.z();
+    return index_ * (p - ray->entry()).normalized().z();
+  }
+
+ private:
+  double index_;
+  std::optional<Eigen::Vector3d> place_;
+  Eigen::Vector3d before_ = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d inside_ = Eigen::Vector3d::UnitZ();  ///< Behind a flat front.
+};
+
+/// Light of one wavelength.
+struct WaveColor {
+  WaveColor(const OpticalSetup& with_pixels, double wavelength_mm, double share_of_light)
+      : setup(with_pixels),
+        light(setup),
+        path(setup),
+        screen(setup),
+        wavelength(wavelength_mm),
+        share(share_of_light) {}
+
+  OpticalSetup setup;  ///< With pixels as the source's blur requires.
+  LightPath light;
+  LampPath path;
+  Screen screen;
+  double wavelength;  ///< mm
+  double share;       ///< Of the brightness.
+};
+
+/// Common inputs of the tiles.
+struct WaveScene {
+  const WaveOptions& options;
+  const RunControl& control;
+  std::vector<WaveColor> colors;
+  std::optional<OutlineIndex> edge;  ///< Of a lens with an outline.
+};
+
+/// How a tile's field is laid.
+struct TilePlan {
+  bool divided = false;                ///< Its quarters follow instead.
+  double level = 0.0;                  ///< z of the starting plane, mm.
+  double far_level = 0.0;              ///< z of the plane on which the field ends, mm.
+  Eigen::Vector2d mean{0.0, 0.0};      ///< Direction of the mean ray.
+  Eigen::Vector2d steepest{0.0, 0.0};  ///< Directions from the mean that go as waves.
+  Eigen::Vector2d spread{0.0, 0.0};    ///< Directions to which they are scattered besides.
+  bool limited = false;                ///< Steeper ones go as rays.
+  FieldPlan field;
+};
+
+/// What is kept of a tile from one look at its surface to the next.
+struct TileMemory {
+  /// Of the tile and its parts in turn, made by the first look: pictures jump by some 1e-4 where
+  /// the size of a field does, and so they do not while a surface changes a little.
+  std::vector<TilePlan> plans;
+  bool keeps_fields = false;
+  std::vector<PlaneField> fields;  ///< On the screen, for tile_heights_bar(), which uses them up.
+};
+
+/// Light that a tile of a surface sends to the pixels, of its quarters if its field would be too
+/// large. Nothing if the scene's control asks to stop.
+/// @param nodes  of the tile and around. @param memory  may be null.
+std::vector<PixelLight> tile_light(const WaveScene& scene, const WaveColor& color,
+                                   const SurfaceNodes& nodes, const Tile& tile,
+                                   TileMemory* memory = nullptr);
+
+/// Derivatives of Σ by_pixel · light by the heights of the tile's nodes at their places, row by
+/// row. A height changes the optical path of the ray through it, which is stationary (Fermat); that
+/// it also changes the amplitude on the starting plane, by D q² / 2k of that for ripples of wave
+/// number q and D from the surface to the plane, is left out, as is light that goes as rays.
+/// @param by_pixel  of all pixels of color.setup, row by row from the top.
+/// @param memory    of tile_light() for the same nodes.
+std::vector<double> tile_heights_bar(const WaveScene& scene, const WaveColor& color,
+                                     const SurfaceNodes& nodes, const Tile& tile,
+                                     std::span<const double> by_pixel, TileMemory& memory);
+
+}  // namespace lensforge
