@@ -370,17 +370,6 @@ void begin_next_level(Checkpoint& state) {
   ++state.level;
 }
 
-/// The waves of a round. Its tiles are narrower than those of the round before or wider: an
-/// optimiser that has the same ones all the time puts light where their edges leave it out (0.0002
-/// of 0.0022).
-WaveOptions waves_of_round(WaveOptions waves, int round) {
-  constexpr double kNarrower = 20.0 / 24.0;
-  constexpr double kMoreOverlap = 1.5;
-  if (round % 2 == 1) waves.tile *= kNarrower;
-  waves.overlap *= kMoreOverlap;
-  return waves;
-}
-
 /// Step lengths for waves: those for rays, since measuring takes eight pictures.
 StepScales ray_scales(const DesignTask& task, const DesignLog& log, LevelProblem problem,
                       const SurfaceMesh& mesh) {
@@ -438,10 +427,6 @@ bool run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
   while (state.round < level.rounds) {
     const bool corrects = needs_correction(problem, level, state);
     if (corrects) problem.target = corrected_target(task, log, problem, level, state.mesh, target);
-    if (level.waves) {
-      problem.objective.waves =
-          waves_of_round(wave_options(task.options, problem.setup), state.round);
-    }
     if (corrects || level.waves || !stage) {
       log.report_step("preparing iterations");
       stage.reset();  // There is not always room for two.
