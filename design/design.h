@@ -46,7 +46,8 @@ struct DesignResult {
     Image picture;
   };
   std::optional<Made> made;
-  /// The picture as a wave makes it, of the part where there is one; where the last steps followed it.
+  /// The picture as a wave makes it, of the part where there is one; where the last steps followed
+  /// it.
   struct Wall {
     ImageMetrics metrics;
     Image picture;

@@ -74,9 +74,8 @@ ColorImage displayed(const Image& image) {
 
 /// Target, projected picture, that of the part as made if it is known, and the surface.
 py::bytes png_of(const LensObject& lens) {
-  const std::vector<unsigned char> png = run_released([&](const RunControl&) {
-    return encode_png(displayed(app::draw_overview(lens.design)));
-  });
+  const std::vector<unsigned char> png = run_released(
+      [&](const RunControl&) { return encode_png(displayed(app::draw_overview(lens.design))); });
   return {reinterpret_cast<const char*>(png.data()), png.size()};
 }
 

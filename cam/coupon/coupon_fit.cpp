@@ -21,8 +21,8 @@
 #include "core/optics/polish_transfer.h"
 #include "core/schema/toml.h"
 #include "core/text/number_text.h"
-#include "core/text/words.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -16,7 +16,6 @@ namespace {
 
 using nlohmann::json;
 
-
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json pair(const Eigen::Vector2d& v) { return {v.x(), v.y()}; }

@@ -31,8 +31,8 @@
 #include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/sandbox/child_work.h"
-#include "core/text/words.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -33,9 +33,9 @@ inline constexpr const char* kSetup = "setup.svg";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {kJson,      kSurface,   kSpline,    kSheet,       kFront,
-                                    kTargetPng, kTargetExr, kRenderPng, kRenderExr,   kRenderColor, kWall,
-                                    kError,     kOverview,  kSetup,     kConvergence, kCheckpoint};
+inline constexpr std::array kAll = {
+    kJson,      kSurface,     kSpline, kSheet, kFront,    kTargetPng, kTargetExr,   kRenderPng,
+    kRenderExr, kRenderColor, kWall,   kError, kOverview, kSetup,     kConvergence, kCheckpoint};
 
 /// Temporary folder of old versions, left behind if one was killed.
 inline constexpr const char* kStaging = "lens";

@@ -123,8 +123,8 @@ struct ObjectiveEvaluation {
 /// One iteration, a row of convergence.csv.
 struct ConvergenceRow {
   /// "transport": a Newton step; "update": a step of the correspondence-guided update; "render": a
-  /// step of rendering-guided optimisation; "spline": a step of a spline's optimisation; "waves": the
-  /// same by waves.
+  /// step of rendering-guided optimisation; "spline": a step of a spline's optimisation; "waves":
+  /// the same by waves.
   std::string stage;
   int level = 0;
   int round = 0;

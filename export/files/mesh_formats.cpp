@@ -27,8 +27,8 @@
 #include "core/mesh/mesh_files.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/schema/json.h"
-#include "core/text/words.h"
 #include "core/text/version.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/text/words.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 #include <string>
+
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
