@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/commands/reflect_command.h"
-
 #include <algorithm>
 #include <filesystem>
 #include <string>
 #include <system_error>
 
+#include "app/commands/settings.h"
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"

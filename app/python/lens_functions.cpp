@@ -14,8 +14,8 @@
 
 #include "app/commands/cam_command.h"
 #include "app/commands/design_command.h"
-#include "app/commands/export_command.h"
 #include "app/commands/overview.h"
+#include "app/commands/settings.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/python/arrays.h"

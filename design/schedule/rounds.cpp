@@ -354,6 +354,12 @@ Checkpoint resumed(const DesignTask& task, std::uint64_t fingerprint) {
     throw InputError("checkpoint '" + task.options.checkpoint.string() + "' belongs to " +
                      owner_of(saved, task));
   }
+  // A checkpoint does not hold triangles; those of control points are not those of a mesh.
+  const auto level = static_cast<std::size_t>(saved.level);
+  if (level < task.levels.size() && task.levels[level].spline &&
+      saved.mesh.grid == task.levels[level].grid) {
+    saved.mesh = net_mesh({saved.mesh.grid, std::move(saved.mesh.vertices)});
+  }
   return saved;
 }
 

@@ -2,12 +2,10 @@
 #include <gmock/gmock.h>
 
 #include "app/commands/cam_command.h"
-#include "app/commands/coupon_command.h"
 #include "app/commands/design_command.h"
-#include "app/commands/export_command.h"
 #include "app/commands/nest_command.h"
-#include "app/commands/reflect_command.h"
 #include "app/commands/send_command.h"
+#include "app/commands/settings.h"
 #include "cam/plan/cam_options.h"
 #include "core/temp_folder.h"
 #include "design/setup/option_tables.h"

@@ -7,12 +7,10 @@
 #include <set>
 
 #include "app/commands/cam_command.h"
-#include "app/commands/coupon_command.h"
 #include "app/commands/design_command.h"
-#include "app/commands/export_command.h"
 #include "app/commands/nest_command.h"
-#include "app/commands/reflect_command.h"
 #include "app/commands/send_command.h"
+#include "app/commands/settings.h"
 #include "app/frame/option_set.h"
 #include "cam/coupon/coupon_layout.h"
 #include "cam/plan/cam_options.h"

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "app/frame/command_run.h"
+#include "app/frame/option_set.h"
+#include "cam/coupon/coupon_layout.h"
+#include "design/reflect.h"
+#include "export/export.h"
+
+/// Options of the short commands: coupon, export and reflect.
+namespace lensforge::app {
+
+/// Options of `lensforge coupon`.
+struct CouponSettings {
+  std::string out;            ///< Folder of the coupon, or the fitted workshop's file.
+  std::string fit;            ///< Readings to fit; empty: make a coupon.
+  std::string workshop;       ///< TOML file; empty for the defaults.
+  std::string workshop_text;  ///< Content of that file.
+  CouponOptions coupon;
+};
+
+/// Describes every option of the command.
+void describe(Description& d, CouponSettings& settings);
+
+/// Reads the workshop. @throw InputError naming file or option, value and rule, also if an option
+/// of the cut is given with --fit.
+void settle(const OptionSet& options, CouponSettings& settings);
+
+/// Options of `lensforge export`.
+struct ExportSettings {
+  std::string source;
+  std::string out;
+  ExportSurface surface = ExportSurface::kDesigned;
+  ExportOptions options;
+};
+
+/// Describes every option of the command.
+void describe(Description& d, ExportSettings& settings);
+
+/// @throw InputError naming an option that was given but does not apply to the format.
+void require_fitting_options(const OptionSet& options, const ExportFormat& format);
+
+/// What was written, without the file itself.
+CommandResult export_report(const ExportResult& result);
+
+/// Options of `lensforge reflect`.
+struct ReflectSettings {
+  std::string mesh;  ///< File to read.
+  std::string out;   ///< Folder; empty with `evaluate`.
+  bool evaluate = false;
+  bool resume = false;
+  reflect::ReflectOptions reflect;
+};
+
+/// Describes every option of the command.
+void describe(Description& d, ReflectSettings& settings);
+
+}  // namespace lensforge::app
