@@ -286,6 +286,7 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
       }
     }
     std::vector<const SurfaceNodes*> nodes;
+    nodes.reserve(sampled.size());
     for (const SurfaceNodes& one : sampled) nodes.push_back(&one);
     return nodes;
   };
