@@ -415,13 +415,13 @@ nlohmann::json made_json(const MadeBy& process, const DesignResult::Made& made) 
           {"metrics", metrics_json(made.metrics)}};
 }
 
-}  // namespace
-
 nlohmann::json waves_json(const DesignResult::Wall& wall) {
   nlohmann::json fields = metrics_json(wall.metrics);
   fields["wavelength_nm"] = wall.wavelength / kMmPerNm;
   return fields;
 }
+
+}  // namespace
 
 nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& device,
                                  const DesignOptions& design, const DesignResult& result) {

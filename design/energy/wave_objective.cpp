@@ -61,6 +61,7 @@ ObjectiveEvaluation WaveObjective::evaluate(const double* points, double* gradie
   if (!result.feasible) return result;
   result.mae = 0.0;
   result.energy.image = 0.0;
+  result.energy.gradient = 0.0;
   const double share = 1.0 / static_cast<double>(parts_.size());
   for (SplinePart<Executor>& part : parts_) add_picture(points, part, share, result, gradient);
   return result;

@@ -283,7 +283,8 @@ bool alternate(const LevelSite& site, const SurfaceMesh& before,
       !site.level.spline && state.transporting && state.round < options.transport_rounds;
   if (transports) start_from_transport(site, state);
   if (!site.level.spline && !relax(site, 2, state.mesh)) relax(site, 3, state.mesh);
-  const bool rescaled = !state.scales.known();
+  // Steps for waves are not measured anew: an idle round by waves is the last.
+  const bool rescaled = !state.scales.known() || site.level.waves;
   if (options.rendering_guided && !follow_picture(site, observe, state)) return false;
   const double idle = site.level.waves ? kIdleWaves : kIdleRound;
   conclude_round({before, site.stage.value(state.mesh), transports, rescaled, idle},
@@ -328,9 +329,7 @@ void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state) 
     state.transporting = false;
     state.scales = {};
   }
-  // Steps for waves are not measured anew: an idle round by waves is the last.
-  const bool last = outcome.rescaled || outcome.idle > kIdleRound;
-  const bool exhausted = idle && last && !outcome.transported;
+  const bool exhausted = idle && outcome.rescaled && !outcome.transported;
   state.round = exhausted ? rounds : state.round + 1;
 }
 

@@ -37,7 +37,7 @@ struct RoundOutcome {
   const SurfaceMesh& before;
   double value = 0.0;        ///< Objective of the state's mesh.
   bool transported = false;  ///< It began with transport.
-  bool rescaled = false;     ///< Its steps were measured anew.
+  bool rescaled = false;     ///< Its steps were measured anew, or never will be.
   /// Share by which it must lower the objective.
   double idle = kIdleRound;
 };

@@ -173,7 +173,7 @@ void describe(Description& d, LightOptions& o) {
       "--light-model", o.model,
       {{"rays", LightModel::kRays}, {"waves", LightModel::kWaves}, {"auto", LightModel::kAuto}},
       "what a spline's last steps follow: rays; or, minutes longer, the picture that light makes "
-      "as a wave, which errs by half as much afterwards; auto takes waves unless the lamp blurs "
+      "as a wave, which errs less afterwards; auto takes waves unless the lamp blurs "
       "more than they do");
   d.number("--wavelength", o.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength), "nm",
            "of the wave, for --light-model; white light is as 550");

@@ -223,7 +223,7 @@ class WaveTile {
       whole_ += flux * windows;
     });
     if (is_dark()) return;
-    if (plan_.field.columns == 0) plan_.mean = mean / whole_;
+    if (plan_.field.columns == 0) plan_.field.cosine = mean / whole_;
     for (std::size_t k = 0; k < amplitude_.size(); ++k) {
       // At a caustic of the starting plane itself the area vanishes, but not the light around it.
       const double least = 1e-3 * surface_.spacing.prod();
@@ -241,7 +241,8 @@ class WaveTile {
 
   /// Share of a node's light that goes as a wave.
   [[nodiscard]] double as_wave(const Node& node) const {
-    const Eigen::Vector2d off = (node.cosine - plan_.mean).cwiseAbs().cwiseQuotient(plan_.steepest);
+    const Eigen::Vector2d off =
+        (node.cosine - plan_.field.cosine).cwiseAbs().cwiseQuotient(plan_.steepest);
     const double share = (1.0 - off.maxCoeff()) / (1.0 - kFade);
     if (!plan_.limited || share >= 1.0) return 1.0;
     return share <= 0.0 ? 0.0 : share * share * (3.0 - 2.0 * share);
@@ -297,7 +298,7 @@ class WaveTile {
   /// around the mean ray.
   void make_plan() {
     const double level = plan_.level;
-    const Eigen::Vector2d slope = plan_.mean / std::sqrt(1.0 - plan_.mean.squaredNorm());
+    const Eigen::Vector2d slope = plan_.field.slope();
     Eigen::AlignedBox2d start;
     for (const Node& node : nodes_) {
       if (node.lit) start.extend(node.q);
@@ -314,11 +315,11 @@ class WaveTile {
     plan_.field.wavelength = color_.wavelength;
     plan_.field.distance = distance;
     plan_.field.centre = centre;
-    plan_.field.cosine = plan_.mean;
     plan_.field.points = {is_cut(tile_.x) ? kEdgePoints : 1, is_cut(tile_.y) ? kEdgePoints : 1};
     plan_.steepest.setConstant(1e-9);
     for (const Node& node : nodes_) {
-      if (node.lit) plan_.steepest = plan_.steepest.cwiseMax((node.cosine - plan_.mean).cwiseAbs());
+      if (node.lit)
+        plan_.steepest = plan_.steepest.cwiseMax((node.cosine - plan_.field.cosine).cwiseAbs());
     }
     plan_nodes(start);
     // Below the spread of the waves, giving up more rays would save little.
@@ -419,12 +420,13 @@ class TileParts {
   template <class Take>
   void for_each(const Tile& tile, const Take& take) {
     if (scene_.control.stop_requested()) return;
-    const WaveTile whole(scene_, color_, nodes_, tile, planned_ ? &plans_[next_] : nullptr);
+    const TilePlan* const plan = planned_ ? &plans_[next_++] : nullptr;
+    // A tile that was dark has no field: what little reaches it since then waits for new plans.
+    if (plan != nullptr && plan->field.columns == 0) return;
+    const WaveTile whole(scene_, color_, nodes_, tile, plan);
     if (!planned_) plans_.push_back(whole.plan());
-    ++next_;
-    if (whole.is_dark()) return;
     if (!whole.plan().divided) {
-      take(whole);
+      if (!whole.is_dark()) take(whole);
       return;
     }
     for (const Stretch& y : tile.y.halves()) {

@@ -269,7 +269,6 @@ struct TilePlan {
   bool divided = false;                ///< Its quarters follow instead.
   double level = 0.0;                  ///< z of the starting plane, mm.
   double far_level = 0.0;              ///< z of the plane on which the field ends, mm.
-  Eigen::Vector2d mean{0.0, 0.0};      ///< Direction of the mean ray.
   Eigen::Vector2d steepest{0.0, 0.0};  ///< Directions from the mean that go as waves.
   Eigen::Vector2d spread{0.0, 0.0};    ///< Directions to which they are scattered besides.
   bool limited = false;                ///< Steeper ones go as rays.
