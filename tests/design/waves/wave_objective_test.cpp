@@ -75,8 +75,10 @@ NodeWaves waves_of(const OpticalSetup& setup, const WaveOptions& options, int th
 
 /// A number of the picture: a weighted sum of its pixels.
 std::vector<double> weights() {
-  std::vector<double> w;
-  for (int k = 0; k < kPixels * kPixels; ++k) w.push_back(std::sin(1.7 * k) + 0.3 * (k % 5));
+  std::vector<double> w(std::size_t{kPixels} * kPixels);
+  for (std::size_t k = 0; k < w.size(); ++k) {
+    w[k] = std::sin(1.7 * static_cast<double>(k)) + 0.3 * static_cast<double>(k % 5);
+  }
   return w;
 }
 
