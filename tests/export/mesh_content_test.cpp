@@ -51,7 +51,7 @@ class MeshContentTest : public ::testing::Test {
 
   /// A package with this text as its model.
   [[nodiscard]] fs::path package(const std::string& model) const {
-    const fs::path path = folder_ / "b.3mf";
+    fs::path path = folder_ / "b.3mf";
     int error = 0;
     zip_t* zip = zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &error);
     zip_file_add(zip, "other/part.model", zip_source_buffer(zip, model.data(), model.size(), 0), 0);

@@ -331,8 +331,8 @@ TEST(PictureReader, EveryKindOfPnmIsRead) {
                                           "P2\n2 1\n7\n0 7\n",
                                           "P3\n2 1 7\n0 0 0 7 7 7\n",
                                           std::string("P4\n2 1\n\x80"),
-                                          std::string("P5\n2 1\n7\n\0\7", 12),
-                                          std::string("P5\n2 1\n300\n\0\0\1\x2c", 16),
+                                          std::string("P5\n2 1\n7\n\0\7", 11),
+                                          std::string("P5\n2 1\n300\n\0\0\1\x2c", 15),
                                           std::string("P6\n2 1\n255\n\0\0\0\377\377\377", 17)};
   for (const std::string& picture : pictures) {
     write_bytes(folder / "p", picture);

@@ -176,8 +176,8 @@ TEST(StlReader, FacetsOnOneLineAreAllRead) {
   const std::string facet =
       " facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 1 1 0 endloop endfacet";
   for (const std::string name : {"", " of facets"}) {
-    EXPECT_EQ(read_stl("solid" + name + facet + facet + " endsolid" + name, "m").triangle_count(),
-              2);
+    const std::string file = lensforge::joined({"solid", name, facet, facet, " endsolid", name});
+    EXPECT_EQ(read_stl(file, "m").triangle_count(), 2);
   }
 }
 
@@ -299,8 +299,9 @@ TEST(PlyReader, EitherByteOrderAndEveryOtherElementIsRead) {
       "\1\0\0\0"
       "\0\0\1\377",
       25);
-  for (const std::string& content : {"ply\nformat binary_little_endian" + header + little,
-                                     "ply\nformat binary_big_endian" + header + big}) {
+  for (const std::string& content :
+       {lensforge::joined({"ply\nformat binary_little_endian", header, little}),
+        lensforge::joined({"ply\nformat binary_big_endian", header, big})}) {
     const SurfaceMesh mesh = read_ply(content, "m");
     EXPECT_EQ(mesh.triangles.col(0), Eigen::Vector3i(0, 1, 2));
     EXPECT_EQ(mesh.vertices.col(1), Eigen::Vector3d(256, 0, 0));
