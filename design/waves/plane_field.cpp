@@ -318,15 +318,14 @@ namespace {
 /// How a field's nodes lie on pixels: each has a cell that is spread over those it touches.
 class NodesOnPixels {
  public:
-  NodesOnPixels(const FieldPlan& plan, const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
-                const Eigen::Vector2i& pixels)
-      : by_node_(by_mm * plan.step.asDiagonal()),
-        origin_(centre - by_node_ * plan.middle()),
+  NodesOnPixels(const FieldPlan& plan, const OnPicture& to)
+      : by_node_(to.by_mm * plan.step.asDiagonal()),
+        origin_(to.centre - by_node_ * plan.middle()),
         cell_(by_node_.cwiseAbs().rowwise().sum()) {
     const Eigen::Vector2d half =
         0.5 * by_node_.cwiseAbs() * Eigen::Vector2d(plan.columns, plan.rows) + cell_;
-    low = (centre - half).array().floor().cast<int>().max(0);
-    high = (centre + half).array().ceil().cast<int>().min(pixels.array());
+    low = (to.centre - half).array().floor().cast<int>().max(to.pixels.min().array());
+    high = (to.centre + half).array().ceil().cast<int>().min(to.pixels.max().array());
   }
 
   Eigen::Vector2i low;   ///< First pixel.
@@ -380,9 +379,8 @@ class NodesOnPixels {
 
 }  // namespace
 
-PixelLight PlaneField::spread(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
-                              const Eigen::Vector2i& pixels) const {
-  const NodesOnPixels on(plan_, centre, by_mm, pixels);
+PixelLight PlaneField::spread(const OnPicture& to) const {
+  const NodesOnPixels on(plan_, to);
   PixelLight result;
   if (on.none()) return result;
   result.first = on.low;
@@ -402,12 +400,11 @@ PixelLight PlaneField::spread(const Eigen::Vector2d& centre, const Eigen::Matrix
   return result;
 }
 
-void PlaneField::pull(const Eigen::Vector2d& centre, const Eigen::Matrix2d& by_mm,
-                      const Eigen::Vector2i& pixels, std::span<const double> by_pixel) {
-  const NodesOnPixels on(plan_, centre, by_mm, pixels);
+void PlaneField::pull(const OnPicture& to, std::span<const double> by_pixel) {
+  const NodesOnPixels on(plan_, to);
   std::vector<double> bars;
   for (int row = on.low.y(); row < on.high.y(); ++row) {
-    const auto first = by_pixel.begin() + std::ptrdiff_t{row} * pixels.x();
+    const auto first = by_pixel.begin() + std::ptrdiff_t{row} * to.columns;
     if (!on.none()) bars.insert(bars.end(), first + on.low.x(), first + on.high.x());
   }
   const double doubled_area = 2.0 * plan_.step.prod();
