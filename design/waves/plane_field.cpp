@@ -62,9 +62,6 @@ class UnitPhases {
 /// Nodes laid at once.
 constexpr std::size_t kPending = 2048;
 
-/// Square of the least cosine of a direction that goes on: a degree from the plane.
-constexpr double kGrazing = 3e-4;
-
 /// Vertices are moved to this part of a step, so that sides are found without rounding.
 constexpr double kParts = 1024.0;
 
@@ -156,15 +153,12 @@ class LaidTriangle {
   }
 
  private:
-  /// Turns without those of the mean ray: the mean of the vertex's own and its tangent plane's.
+  /// Turns are the mean of the vertex's own and its tangent plane's.
   void lay(const FieldPlan& plan, const PlaneField::Vertex& vertex, const Eigen::Vector2d& at,
            std::size_t k) {
     amplitude_[k] = vertex.amplitude;
     const Eigen::Vector2d half = 0.5 / plan.wavelength * vertex.cosine.cwiseProduct(plan.step);
-    const Eigen::Vector2d mean = plan.cosine.cwiseProduct(plan.step) / plan.wavelength;
-    const Eigen::Vector2d by_step = half - mean;
-    turns_[k] = {by_step.x(), by_step.y(),
-                 vertex.path / plan.wavelength - half.dot(at) + mean.dot(plan.middle())};
+    turns_[k] = {half.x(), half.y(), vertex.path / plan.wavelength - half.dot(at)};
   }
 
   Eigen::AlignedBox2d box_;
@@ -267,50 +261,53 @@ void PlaneField::propagate() {
 
 void PlaneField::return_back() { go(true); }
 
-/// A component of the spectrum with the direction p turns by k D √(1 − |p|²), without what the mean
-/// ray's turns by and without the shift of the nodes to far_centre(); the adjoint turns it back.
+/// A component with the direction s turns by −k D b s² / 2m, b the mean ray's bend and m the
+/// magnification (Sziklas and Siegman, Applied Optics 14, 1975); the adjoint turns it back.
 void PlaneField::go(bool back) {
   transform(values_, plan_.columns, plan_.rows, FFTW_FORWARD);
-  const Eigen::Vector2d slope = plan_.slope();
-  const double root = std::sqrt(1.0 - plan_.cosine.squaredNorm());
-  const auto direction = [&](int n, int count, int axis) {
-    const int frequency = n < (count + 1) / 2 ? n : n - count;
-    return plan_.wavelength * frequency / (count * plan_.step[axis]);
-  };
-  const auto columns = static_cast<std::size_t>(plan_.columns);
-  const double wavelengths = plan_.distance / plan_.wavelength;
-  const double scale = 1.0 / static_cast<double>(values_.size());
-  std::vector<double> more_x(columns);
-  for (int i = 0; i < plan_.columns; ++i) {
-    more_x[static_cast<std::size_t>(i)] = direction(i, plan_.columns, 0);
-  }
-  std::vector<double> turns(columns);
-  std::vector<float> kept(columns);
+  const Eigen::Vector2d way = plan_.distance * plan_.bend().cwiseQuotient(plan_.magnification);
   UnitPhases phases;
-  for (int j = 0; j < plan_.rows; ++j) {
-    const double more_y = direction(j, plan_.rows, 1);
-    const double y = plan_.cosine.y() + more_y;
-    for (std::size_t i = 0; i < columns; ++i) {
-      const double x = plan_.cosine.x() + more_x[i];
-      const double square = 1.0 - x * x - y * y;
-      const double going = std::sqrt(std::max(square, kGrazing));
-      const double aside_x = std::abs(plan_.distance * (x / going - slope.x()));
-      const double aside_y = std::abs(plan_.distance * (y / going - slope.y()));
-      const bool keep =
-          square > kGrazing && aside_x <= plan_.reach.x() && aside_y <= plan_.reach.y();
-      // √s − √s0 without cancellation.
-      const double longer = (square - root * root) / (going + root);
-      turns[i] = wavelengths * (longer + slope.x() * more_x[i] + slope.y() * more_y);
-      kept[i] = keep ? static_cast<float>(scale) : 0.0F;
-    }
-    if (back) {
-      for (double& turn : turns) turn = -turn;
+  const auto factors = [&](int count, int axis, double scale) {
+    std::vector<double> turns;
+    std::vector<double> kept;
+    for (int n = 0; n < count; ++n) {
+      const int frequency = n < (count + 1) / 2 ? n : n - count;
+      const double direction = plan_.wavelength * frequency / (count * plan_.step[axis]);
+      turns.push_back((back ? 0.5 : -0.5) * way[axis] / plan_.wavelength * direction * direction);
+      kept.push_back(std::abs(way[axis] * direction) <= plan_.reach[axis] ? scale : 0.0);
     }
     phases.find(turns);
+    std::vector<std::complex<float>> all(turns.size());
+    for (std::size_t n = 0; n < all.size(); ++n) all[n] = static_cast<float>(kept[n]) * phases[n];
+    return all;
+  };
+  const auto along_x = factors(plan_.columns, 0, 1.0 / static_cast<double>(values_.size()));
+  const auto along_y = factors(plan_.rows, 1, 1.0);
+  for (int j = 0; j < plan_.rows; ++j) {
     std::complex<float>* const row = &at(0, j);
-    for (std::size_t i = 0; i < columns; ++i) row[i] *= kept[i] * phases[i];
+    const std::complex<float> of_row = along_y[static_cast<std::size_t>(j)];
+    for (std::size_t i = 0; i < along_x.size(); ++i) row[i] *= of_row * along_x[i];
   }
   transform(values_, plan_.columns, plan_.rows, FFTW_BACKWARD);
+}
+
+PlaneField::Vertex laid_ray(const FieldPlan& plan, const PlaneField::Vertex& ray) {
+  const double secant = 1.0 / std::sqrt(1.0 - ray.cosine.squaredNorm());
+  const double mean_secant = 1.0 / std::sqrt(1.0 - plan.cosine.squaredNorm());
+  const Eigen::Vector2d mean_slope = plan.cosine * mean_secant;
+  const Eigen::Vector2d bend = plan.bend();
+  const Eigen::Vector2d off = ray.cosine - plan.cosine;
+  const Eigen::Vector2d bent = bend.cwiseProduct(off);
+  PlaneField::Vertex laid = ray;
+  laid.place += plan.distance * (ray.cosine * secant - mean_slope - bent);
+  const double shorter = secant - mean_secant - plan.cosine.dot(bent) - 0.5 * off.dot(bent);
+  const Eigen::Vector2d from = laid.place - plan.centre;
+  const Eigen::Vector2d curved = (Eigen::Vector2d::Ones() - plan.magnification)
+                                     .cwiseQuotient(plan.distance * bend)
+                                     .cwiseProduct(from);
+  laid.path += plan.distance * shorter - plan.cosine.dot(from) + 0.5 * from.dot(curved);
+  laid.cosine = off + curved;
+  return laid;
 }
 
 namespace {
@@ -319,7 +316,7 @@ namespace {
 class NodesOnPixels {
  public:
   NodesOnPixels(const FieldPlan& plan, const OnPicture& to)
-      : by_node_(to.by_mm * plan.step.asDiagonal()),
+      : by_node_(to.by_mm * plan.magnification.cwiseProduct(plan.step).asDiagonal()),
         origin_(to.centre - by_node_ * plan.middle()),
         cell_(by_node_.cwiseAbs().rowwise().sum()) {
     const Eigen::Vector2d half =

@@ -14,6 +14,9 @@ namespace {
 /// Fields are sampled this much finer than the steepest ray asks for.
 constexpr double kFiner = 1.15;
 
+/// Nodes per pixel, at least: the light of each is spread evenly over its cell.
+constexpr double kLeastPerPixel = 8.0;
+
 /// Room around the light of a tile, in √(λ f): what a window's edge scatters farther is lost.
 constexpr double kRoom = 8.0;
 
@@ -36,6 +39,10 @@ constexpr double kLeastRamp = 1.0;  ///< In √(λ f).
 /// The same for patches, which are not divided: 8 bytes each. As many are in 150 mm of lens before
 /// a wall at 75 mm, if all its light goes to one patch.
 constexpr double kMostPatchNodes = 4e8;
+
+/// Magnifications that are tried: so many either side of 1, up to the most.
+constexpr int kMagnifications = 12;
+constexpr double kMostWider = 8.0;
 
 /// Room in a patch's plan for its rays to change, as a factor.
 constexpr double kSlack = 1.05;
@@ -126,6 +133,7 @@ class WaveTile {
     double path = 0.0;       ///< W, mm
     double rise = 0.0;       ///< ∂W/∂z of the surface, where the ray meets the starting plane.
     double window = 0.0;
+    PlaneField::Vertex laid{};  ///< laid_ray(); its amplitude with the window.
   };
 
   /// Number of a node of the tile on the surface.
@@ -141,13 +149,14 @@ class WaveTile {
     for (int j = 0; j < rows_; ++j) {
       for (int i = 0; i < columns_; ++i) trace_node(i, j, plan_.level);
     }
-    weigh_triangles();
+    find_mean_ray();
     if (is_dark()) return;
-    if (plan != nullptr && fits(*plan)) {
+    if (plan != nullptr) {
       plan_ = *plan;
-    } else {
-      make_plan();
+      lay_rays();
     }
+    if (plan == nullptr || !fits()) make_plan();
+    weigh_nodes();
     if (plan_.limited) for_each_ray([&](const Three&, double flux) { as_rays_ += flux; });
     plan_.divided = should_be_divided();
   }
@@ -174,17 +183,31 @@ class WaveTile {
   }
 
   /// True if the rays stay inside a patch's plan. What goes as rays does so for good.
-  [[nodiscard]] bool fits(const TilePlan& plan) const {
-    if (plan.limited) return true;
+  [[nodiscard]] bool fits() const {
+    if (plan_.limited) return true;
     return std::all_of(nodes_.begin(), nodes_.end(), [&](const Node& node) {
-      if (!is_bright(node)) return true;
-      const Eigen::Vector2d from = node.q - plan.field.centre;
-      const Eigen::Vector2d aside = plan.field.distance * (node.slope - plan.field.slope());
-      const Eigen::Vector2d off = node.cosine - plan.field.cosine;
-      return (from.array().abs() <= plan.start.array()).all() &&
-             ((from + aside).array().abs() <= plan.far.array()).all() &&
-             (off.array().abs() <= plan.steepest.array()).all();
+      return !is_bright(node) || ((from_centre(node).array().abs() <= plan_.start.array()).all() &&
+                                  (landing(node).array().abs() <= plan_.far.array()).all() &&
+                                  (node.laid.cosine.array().abs() <= plan_.steepest.array()).all());
     });
+  }
+
+  void lay_rays() {
+    for (Node& node : nodes_) {
+      if (!node.lit) continue;
+      node.laid = laid_ray(plan_.field, {node.q, node.cosine, node.path, 0.0});
+    }
+  }
+  /// Of a laid ray, mm.
+  [[nodiscard]] Eigen::Vector2d from_centre(const Node& node) const {
+    return node.laid.place - plan_.field.centre;
+  }
+  /// Where a ray lands, from the mean ray, mm before magnification.
+  [[nodiscard]] Eigen::Vector2d landing(const Node& node) const {
+    const FieldPlan& field = plan_.field;
+    return from_centre(node) + (field.distance * field.bend())
+                                   .cwiseProduct(node.laid.cosine)
+                                   .cwiseQuotient(field.magnification);
   }
 
   void trace_node(int i, int j, double level) {
@@ -236,46 +259,60 @@ class WaveTile {
   [[nodiscard]] bool is_lit(const Three& t) const {
     return nodes_[index(t[0])].lit && nodes_[index(t[1])].lit && nodes_[index(t[2])].lit;
   }
-  /// Twice the area on the starting plane, negative beyond a fold, mm².
+  /// Twice the area of laid rays, negative beyond a fold, mm².
   [[nodiscard]] double doubled_area(const Three& t) const {
-    const Eigen::Vector2d& a = nodes_[index(t[0])].q;
-    return cross(nodes_[index(t[1])].q - a, nodes_[index(t[2])].q - a);
+    const Eigen::Vector2d& a = nodes_[index(t[0])].laid.place;
+    return cross(nodes_[index(t[1])].laid.place - a, nodes_[index(t[2])].laid.place - a);
+  }
+  [[nodiscard]] double flux_on(const Three& t) const {
+    return flux_of(color_.light,
+                   {corners_[index(t[0])], corners_[index(t[1])], corners_[index(t[2])]});
   }
 
-  /// Amplitudes at the nodes, from the light and the area of the triangles around them; the
-  /// tile's mean ray and all its light.
-  void weigh_triangles() {
-    amplitude_.assign(nodes_.size(), 0.0);
-    std::vector<double> area(nodes_.size(), 0.0);
+  /// The tile's mean ray and all its light.
+  void find_mean_ray() {
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     for_each_triangle([&](const Three& t) {
-      if (!is_lit(t)) return;
-      const Corners corners{corners_[index(t[0])], corners_[index(t[1])], corners_[index(t[2])]};
-      const double flux = flux_of(color_.light, corners);
-      const double on_plane = 0.5 * std::abs(doubled_area(t));
-      double windows = 0.0;
+      if (!is_lit(t) || !is_bright(t)) return;
+      const double flux = flux_on(t);
       for (const Corner& c : t) {
         const Node& node = nodes_[index(c)];
-        amplitude_[index(c)] += flux;
-        area[index(c)] += on_plane;
-        windows += node.window * node.window / 3.0;
-        mean += flux * node.window * node.window / 3.0 * node.cosine;
+        const double light = flux * node.window * node.window / 3.0;
+        mean += light * node.cosine;
+        whole_ += light;
       }
-      whole_ += flux * windows;
     });
-    if (is_dark()) return;
-    mean_ = mean / whole_;
-    for (std::size_t k = 0; k < amplitude_.size(); ++k) {
+    if (!is_dark()) mean_ = mean / whole_;
+  }
+
+  /// Amplitudes at the nodes, from the light and the area of the triangles around them.
+  void weigh_nodes() {
+    std::vector<double> light(nodes_.size(), 0.0);
+    std::vector<double> area(nodes_.size(), 0.0);
+    for_each_triangle([&](const Three& t) {
+      if (!is_lit(t)) return;
+      const double flux = flux_on(t);
+      const double on_plane = 0.5 * std::abs(doubled_area(t));
+      for (const Corner& c : t) {
+        light[index(c)] += flux;
+        area[index(c)] += on_plane;
+      }
+    });
+    const double reference = nodes_[index({columns_ / 2, rows_ / 2})].laid.path;
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      Node& node = nodes_[k];
+      if (!node.lit || area[k] == 0.0) continue;
       // At a caustic of the starting plane itself the area vanishes, but not the light around it.
       const double least = 1e-3 * surface_.spacing.prod();
-      amplitude_[k] = area[k] > 0.0 ? std::sqrt(amplitude_[k] / std::max(area[k], least)) : 0.0;
+      const double amplitude = std::sqrt(light[k] / std::max(area[k], least));
+      node.laid.amplitude = amplitude * node.window * std::sqrt(as_wave(node));
+      node.laid.path -= reference;
     }
   }
 
   /// Share of a node's light that goes as a wave.
   [[nodiscard]] double as_wave(const Node& node) const {
-    const Eigen::Vector2d off =
-        (node.cosine - plan_.field.cosine).cwiseAbs().cwiseQuotient(plan_.steepest);
+    const Eigen::Vector2d off = node.laid.cosine.cwiseAbs().cwiseQuotient(plan_.steepest);
     const double share = (1.0 - off.maxCoeff()) / (1.0 - kFade);
     if (!plan_.limited || share >= 1.0) return 1.0;
     return share <= 0.0 ? 0.0 : share * share * (3.0 - 2.0 * share);
@@ -292,8 +329,7 @@ class WaveTile {
         share += node.window * node.window * (1.0 - as_wave(node)) / 3.0;
       }
       if (share <= 0.0) return;
-      const Corners corners{corners_[index(t[0])], corners_[index(t[1])], corners_[index(t[2])]};
-      action(t, share * flux_of(color_.light, corners));
+      action(t, share * flux_on(t));
     });
   }
 
@@ -348,29 +384,29 @@ class WaveTile {
       const Eigen::Vector2d slope = (far.head<2>() - centre) / distance;
       field.cosine = slope / std::sqrt(1.0 + slope.squaredNorm());
     }
-    const double unit = std::sqrt(color_.wavelength / distance);
-    const auto spread_of = [&](const Stretch& axis) {
-      return std::max((is_cut(axis) ? kEdgeSpread : kSpread) * unit, options_.scatter);
-    };
-    plan_.spread = {spread_of(tile_.x), spread_of(tile_.y)};
-    field.wavelength = color_.wavelength;
     field.distance = distance;
     field.centre = centre;
+    field.wavelength = color_.wavelength;
+    field.magnification = best_magnification();
+    plan_.spread = spread(field.magnification);
+    lay_rays();
     field.points = {is_cut(tile_.x) ? kEdgePoints : 1, is_cut(tile_.y) ? kEdgePoints : 1};
     plan_.steepest.setConstant(1e-9);
+    Eigen::Vector2d farthest = Eigen::Vector2d::Zero();
     for (const Node& node : nodes_) {
       if (!is_bright(node)) continue;
-      plan_.steepest = plan_.steepest.cwiseMax((node.cosine - field.cosine).cwiseAbs());
+      plan_.steepest = plan_.steepest.cwiseMax(node.laid.cosine.cwiseAbs());
+      farthest = farthest.cwiseMax(from_centre(node).cwiseAbs());
     }
     if (tile_.patch) plan_.steepest *= kSlack;
-    plan_nodes(0.5 * start.sizes());
+    plan_nodes(farthest);
     const double most = tile_.patch ? kMostPatchNodes : kMostNodes;
     // Below the spread of the waves, giving up more rays would save little.
     while (node_count() > most && options_.tile > 0.0 &&
            (plan_.steepest.array() > plan_.spread.array()).any()) {
       plan_.limited = true;
       plan_.steepest *= 0.9;
-      plan_nodes(0.5 * start.sizes());
+      plan_nodes(farthest);
     }
   }
 
@@ -385,32 +421,96 @@ class WaveTile {
     return static_cast<double>(plan_.field.columns) * static_cast<double>(plan_.field.rows);
   }
 
-  /// @param start  half the box of the light on the starting plane.
+  /// The magnification with which the field has the fewest nodes.
+  [[nodiscard]] Eigen::Vector2d best_magnification() const {
+    const FieldPlan& field = plan_.field;
+    const Eigen::Vector2d slope = field.slope();
+    std::vector<Eigen::Vector2d> from, to;
+    for (const Node& node : nodes_) {
+      if (!is_bright(node)) continue;
+      from.emplace_back(node.q - field.centre);
+      to.emplace_back(from.back() + field.distance * (node.slope - slope));
+    }
+    Eigen::Vector2d best(1.0, 1.0);
+    for (int axis = 0; axis < 2; ++axis) {
+      const double way = field.distance * field.bend()[axis];
+      double fewest = HUGE_VAL;
+      for (int k = -kMagnifications; k <= kMagnifications; ++k) {
+        const double wider = std::pow(kMostWider, static_cast<double>(k) / kMagnifications);
+        double steepest = 0.0, start = 0.0, far = 0.0;
+        for (std::size_t n = 0; n < from.size(); ++n) {
+          const double begin = from[n][axis];
+          const double end = to[n][axis];
+          steepest = std::max(steepest, std::abs(end - wider * begin) / way);
+          start = std::max(start, std::abs(begin));
+          far = std::max(far, std::abs(end));
+        }
+        const Eigen::Vector2d size =
+            field_size(Eigen::Vector2d::Constant(start), Eigen::Vector2d::Constant(far / wider),
+                       Eigen::Vector2d::Constant(wider));
+        const double count = size[axis] / step_of(Eigen::Vector2d::Constant(steepest),
+                                                  Eigen::Vector2d::Constant(wider))[axis];
+        if (count >= fewest) continue;
+        fewest = count;
+        best[axis] = wider;
+      }
+    }
+    return best;
+  }
+
+  /// @param start, far  farthest that light is on either plane, before magnification.
+  [[nodiscard]] Eigen::Vector2d field_size(const Eigen::Vector2d& start, const Eigen::Vector2d& far,
+                                           const Eigen::Vector2d& magnification) const {
+    if (!tile_.patch) return 2.0 * start.cwiseMax(far) + room(magnification);
+    // What is cyclic beside the patch does no harm.
+    const Eigen::Vector2d patch = half_patch().cwiseQuotient(magnification);
+    return (2.0 * start).cwiseMax(patch + far + scattered(magnification));
+  }
+  [[nodiscard]] Eigen::Vector2d scattered(const Eigen::Vector2d& magnification) const {
+    return (plan_.field.distance * spread(magnification)).cwiseQuotient(magnification);
+  }
+  [[nodiscard]] Eigen::Vector2d step_of(const Eigen::Vector2d& steepest,
+                                        const Eigen::Vector2d& magnification) const {
+    const Eigen::Vector2d pixel = color_.setup.image_size.cwiseQuotient(
+        color_.setup.pixels.cast<double>().cwiseProduct(magnification));
+    const Eigen::Vector2d by_rays =
+        color_.wavelength / (2.0 * kFiner) * (steepest + spread(magnification)).cwiseInverse();
+    return by_rays.cwiseMin(pixel / kLeastPerPixel);
+  }
+  /// Directions to which laid rays are scattered. √(λ f) is √(λ f m) where the light gets wider.
+  [[nodiscard]] Eigen::Vector2d spread(const Eigen::Vector2d& magnification) const {
+    const Eigen::Vector2d units(is_cut(tile_.x) ? kEdgeSpread : kSpread,
+                                is_cut(tile_.y) ? kEdgeSpread : kSpread);
+    const FieldPlan& field = plan_.field;
+    return units.cwiseProduct((field.wavelength / field.distance * magnification).cwiseSqrt())
+        .cwiseMax(options_.scatter);
+  }
+  [[nodiscard]] Eigen::Vector2d room(const Eigen::Vector2d& magnification) const {
+    const double least = kRoom * std::sqrt(color_.wavelength * plan_.field.distance);
+    return (2.0 * scattered(magnification)).cwiseMax(least * magnification.cwiseInverse());
+  }
+
+  /// @param start  farthest that laid rays are from the field's centre.
   void plan_nodes(const Eigen::Vector2d& start) {
     FieldPlan& field = plan_.field;
-    Eigen::AlignedBox2d beyond;  // On the screen, seen from the mean ray.
-    const Eigen::Vector2d slope = field.slope();
+    Eigen::Vector2d farthest = Eigen::Vector2d::Zero();
     for (const Node& node : nodes_) {
-      if (!is_bright(node) || as_wave(node) <= 0.0) continue;
-      beyond.extend(node.q - field.centre + field.distance * (node.slope - slope));
+      if (is_bright(node) && as_wave(node) > 0.0) {
+        farthest = farthest.cwiseMax(landing(node).cwiseAbs());
+      }
     }
-    const Eigen::Vector2d scattered = field.distance * plan_.spread;
-    const Eigen::Vector2d farthest = beyond.min().cwiseAbs().cwiseMax(beyond.max().cwiseAbs());
-    Eigen::Vector2d size;
+    const Eigen::Vector2d& wider = field.magnification;
     if (tile_.patch) {
       plan_.start = kSlack * start;
       plan_.far = kSlack * farthest;
-      // What is cyclic beside the patch does no harm.
-      size = (2.0 * plan_.start).cwiseMax(half_patch() + plan_.far + scattered);
-      field.reach = plan_.far + plan_.start + scattered;
+      field.reach = plan_.far + plan_.start + scattered(wider);
     } else {
-      const double least_room = kRoom * std::sqrt(field.wavelength * field.distance);
-      const Eigen::Vector2d room = (2.0 * scattered).cwiseMax(least_room);
-      size = 2.0 * start.cwiseMax(farthest) + room;
-      field.reach = farthest + start + room;
+      plan_.start = start;
+      plan_.far = farthest;
+      field.reach = farthest + start + room(wider);
     }
-    field.step =
-        color_.wavelength / (2.0 * kFiner) * (plan_.steepest + plan_.spread).cwiseInverse();
+    const Eigen::Vector2d size = field_size(plan_.start, plan_.far, wider);
+    field.step = step_of(plan_.steepest, wider);
     field.columns = transform_size(size.x() / field.step.x());
     field.rows = transform_size(size.y() / field.step.y());
   }
@@ -431,23 +531,20 @@ class WaveTile {
   /// True if it ends at the lens's rim, where no window fades the light.
   static bool is_cut(const Stretch& axis) { return axis.rise == 0 || axis.fall == 0; }
 
+  [[nodiscard]] bool is_bright(const Three& t) const {
+    return std::any_of(t.begin(), t.end(),
+                       [&](const Corner& c) { return nodes_[index(c)].window > 0.0; });
+  }
+
   /// Calls `take(vertices, indices)` for the lit triangles on the starting plane.
   template <class Take>
   void for_each_laid(const Take& take) const {
-    const double reference = nodes_[index({columns_ / 2, rows_ / 2})].path;
     for_each_triangle([&](const Three& t) {
-      if (!is_lit(t)) return;
-      const auto is_in = [&](const Corner& c) { return nodes_[index(c)].window > 0.0; };
-      if (std::none_of(t.begin(), t.end(), is_in)) return;
-      std::array<PlaneField::Vertex, 3> vertices;
-      std::array<std::size_t, 3> indices{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        indices[k] = index(t[k]);
-        const Node& node = nodes_[indices[k]];
-        vertices[k] = {node.q, node.cosine, node.path - reference,
-                       amplitude_[indices[k]] * node.window * std::sqrt(as_wave(node))};
-      }
-      take(vertices, indices);
+      if (!is_lit(t) || !is_bright(t)) return;
+      const std::array<std::size_t, 3> indices{index(t[0]), index(t[1]), index(t[2])};
+      take(std::array<PlaneField::Vertex, 3>{nodes_[indices[0]].laid, nodes_[indices[1]].laid,
+                                             nodes_[indices[2]].laid},
+           indices);
     });
   }
 
@@ -474,7 +571,6 @@ class WaveTile {
   int columns_, rows_;
   std::vector<Node> nodes_;
   std::vector<Eigen::Vector3d> corners_;
-  std::vector<double> amplitude_;
   Eigen::Vector2d mean_{0.0, 0.0};  ///< Direction of all its light, along x and y.
   double whole_ = 0.0;
   double as_rays_ = 0.0;  ///< Light of directions that are too steep for the field.

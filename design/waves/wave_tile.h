@@ -28,16 +28,20 @@ namespace lensforge {
 
 // How a field goes from one plane to another, tile by tile.
 
-/// A field on a plane z = const and its way to a parallel one.
+/// A field on a plane z = const and its way to a parallel one. Without the phase of the mean ray,
+/// and without that of rays that keep to places magnified so: laid fields have little phase left,
+/// and few nodes. Parabolic, for rays that laid_ray() moved.
 struct FieldPlan {
   double wavelength = 550e-6;        ///< mm
   double distance = 0.0;             ///< Between the planes, mm, > 0.
   Eigen::Vector2d centre{0.0, 0.0};  ///< Of the first plane's nodes, mm.
   Eigen::Vector2d cosine{0.0, 0.0};  ///< Direction of the mean ray, along x and y.
-  Eigen::Vector2d step{0.0, 0.0};    ///< Of the nodes, mm.
+  /// Of the light on the other plane against that on the first, along x and y, > 0.
+  Eigen::Vector2d magnification{1.0, 1.0};
+  Eigen::Vector2d step{0.0, 0.0};  ///< Of the nodes, mm.
   int columns = 0, rows = 0;
-  /// Components that go farther aside than this on their way are dropped, mm: they would come back
-  /// on the other side of the nodes.
+  /// Components that go farther aside than this on their way are dropped, mm before magnification:
+  /// they would come back on the other side of the nodes.
   Eigen::Vector2d reach{HUGE_VAL, HUGE_VAL};
   /// Points along x and y by which a node's cell is known to be lit: more than one where the field
   /// has a hard edge across that axis.
@@ -48,6 +52,11 @@ struct FieldPlan {
   [[nodiscard]] Eigen::Vector2d middle() const { return centre_node().cast<double>(); }
   [[nodiscard]] Eigen::Vector2d slope() const {
     return cosine / std::sqrt(1.0 - cosine.squaredNorm());
+  }
+  /// Derivatives of the mean ray's slope by its direction, along x and y.
+  [[nodiscard]] Eigen::Vector2d bend() const {
+    const double c = std::sqrt(1.0 - cosine.squaredNorm());
+    return (1.0 / c + cosine.array().square() / (c * c * c)).matrix();
   }
   /// Where the mean ray from the centre meets the other plane, mm.
   [[nodiscard]] Eigen::Vector2d far_centre() const { return centre + distance * slope(); }
@@ -74,14 +83,14 @@ struct PixelLight {
   std::vector<std::pair<int, double>> rays;
 };
 
-/// A scalar field without the phase of its mean ray, on as many nodes as its steepest rays ask for.
-/// Phases are found in double precision, values kept in single: 1e-7 of the field.
+/// A scalar field on as many nodes as its rays ask for. Phases are found in double precision,
+/// values kept in single: 1e-7 of the field.
 class PlaneField {
  public:
   /// A ray on the plane.
   struct Vertex {
     Eigen::Vector2d place;   ///< mm
-    Eigen::Vector2d cosine;  ///< Direction along x and y.
+    Eigen::Vector2d cosine;  ///< Derivative of its path by the place: laid ones' from the plan's.
     double path = 0.0;       ///< Optical, mm.
     double amplitude = 0.0;  ///< √(light per mm²)
   };
@@ -96,7 +105,8 @@ class PlaneField {
   void add(const std::array<Vertex, 3>& vertices);
   void lay_rest();
 
-  /// Goes to the other plane by the angular spectrum: nodes are then around far_centre().
+  /// Goes to the other plane by the angular spectrum: nodes are then around far_centre(), their
+  /// distances magnified; their light stays what it was.
   void propagate();
 
   /// Adjoint of spread(): a field on the other plane becomes the derivative 2 ∂E/∂|U|² · U.
@@ -157,6 +167,13 @@ class PlaneField {
   std::vector<std::complex<float>> values_;
   Pending pending_;
 };
+
+/// A ray as its field has it: without the plan's phases, and moved along its own direction such
+/// that parabolic waves land where it lands, with its path. The canonical map of what the square
+/// root in the angular spectrum has beyond its parabola around the mean ray: as if rays were
+/// followed for some D |p − p0|² more before waves start.
+/// @param ray  its cosine as of the light.
+PlaneField::Vertex laid_ray(const FieldPlan& plan, const PlaneField::Vertex& ray);
 
 /// A stretch of one axis of the grid, in cells, with a window that rises at its begin and falls at
 /// its end.
@@ -303,12 +320,11 @@ struct TilePlan {
   bool divided = false;                ///< Its quarters show it better.
   double level = 0.0;                  ///< z of the starting plane, mm.
   double far_level = 0.0;              ///< z of the plane on which the field ends, mm.
-  Eigen::Vector2d steepest{0.0, 0.0};  ///< Directions from the mean that go as waves.
+  Eigen::Vector2d steepest{0.0, 0.0};  ///< Directions of laid rays that go as waves.
   Eigen::Vector2d spread{0.0, 0.0};    ///< Directions to which they are scattered besides.
   bool limited = false;                ///< Steeper ones go as rays.
-  // Of a patch.
   Eigen::Vector2d start{0.0, 0.0};  ///< Farthest that rays may start from the field's centre, mm.
-  Eigen::Vector2d far{0.0, 0.0};    ///< Farthest that they may land from its far centre, mm.
+  Eigen::Vector2d far{0.0, 0.0};    ///< The same where they land, before magnification.
   FieldPlan field;
 };
 
