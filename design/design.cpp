@@ -109,8 +109,10 @@ std::optional<DesignResult::Wall> wall_of(const DesignOptions& options, const Le
   std::unique_ptr<const SurfaceField> field = std::make_unique<OpticalField>(surface);
   if (options.made_by)
     field = std::make_unique<MadeField>(*lens.spline, *options.made_by, executor);
-  std::vector<double> light = smooth_wave_flux(lens.setup, wave_grid(lens.setup, surface), *field,
-                                               waves, executor, control);
+  const SurfaceField* const one = field.get();
+  std::vector<double> light =
+      wave_flux(lens.setup, wave_grid(lens.setup, surface), {&one, 1}, waves, executor, control)
+          .front();
   DesignResult::Wall wall;
   wall.wavelength = waves.wavelength;
   const double total = lens.target.total();

@@ -298,8 +298,10 @@ void add_waves(const Scene& scene, double wavelength_nm, CommandFrame& frame,
   WaveOptions options;
   options.wavelength = kMmPerNm * wavelength_nm;
   const OpticalField field(*surface);
-  const std::vector<double> flux = smooth_wave_flux(setup, wave_grid(setup, *surface), field,
-                                                    options, frame.executor(), frame.control());
+  const SurfaceField* const one = &field;
+  const std::vector<double> flux = wave_flux(setup, wave_grid(setup, *surface), {&one, 1}, options,
+                                             frame.executor(), frame.control())
+                                       .front();
   rendering.image = Image(setup.pixels.x(), setup.pixels.y());
   const double total = scene.target ? scene.target->total() : setup.pixels.prod();
   double inside = 0.0;

@@ -283,8 +283,6 @@ struct WaveOptions {
   /// piece.
   double tile = 24.0;
   double overlap = 8.0;
-  /// Side of the patches into which the picture of a smooth surface is divided, in √(λ f); 0: one.
-  double patch = 16.0;
 };
 
 /// What blurs a picture, and by how much.

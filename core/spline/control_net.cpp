@@ -23,6 +23,9 @@ namespace {
 constexpr double kShortStep = 1e-13;
 constexpr int kMaxSteps = 30;
 
+/// A point is found if what is left is at most this share of the net's diagonal.
+constexpr double kNear = 1e-9;
+
 /// Basis functions at nodes first … last.
 std::vector<CubicBasis> bases(int cells, int samples, int first, int last) {
   std::vector<CubicBasis> result;
@@ -83,19 +86,47 @@ SplineFrame ControlNet::at(const Eigen::Vector2d& uv) const {
                   cubic_basis(uv.y(), shape.rows - 3));
 }
 
+namespace {
+
+/// Newton's method. @return distance that was left before its last step.
+double search(const ControlNet& net, const Eigen::Vector2d& xy, Eigen::Vector2d& uv) {
+  const Eigen::Vector2d high = net.cells().cast<double>();
+  double left = 0.0;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const SplineFrame frame = net.at(uv);
+    Eigen::Matrix2d plan;
+    plan << frame.by_u.head<2>(), frame.by_v.head<2>();
+    const Eigen::Vector2d before = uv;
+    const Eigen::Vector2d way = xy - frame.point.head<2>();
+    left = way.norm();
+    uv += plan.inverse() * way;
+    uv = uv.cwiseMax(0.0).cwiseMin(high);
+    if ((uv - before).cwiseAbs().maxCoeff() < kShortStep * high.maxCoeff()) break;
+  }
+  return left;
+}
+
+/// Parameters near those of xy: of the nearest control point.
+Eigen::Vector2d parameters_beside(const ControlNet& net, const Eigen::Vector2d& xy) {
+  Eigen::Index nearest = 0;
+  (net.points.topRows<2>().colwise() - xy).colwise().squaredNorm().minCoeff(&nearest);
+  const Eigen::Vector2d at(static_cast<double>(nearest % net.shape.columns),
+                           static_cast<double>(nearest / net.shape.columns));
+  // A control point is about one knot before its number.
+  return (at.array() - 1.0).matrix().cwiseMax(0.0).cwiseMin(net.cells().cast<double>());
+}
+
+}  // namespace
+
 Eigen::Vector2d ControlNet::parameters_of(const Eigen::Vector2d& xy,
                                           const Eigen::Vector2d& start) const {
   const Eigen::Vector2d high = cells().cast<double>();
   Eigen::Vector2d uv = start.cwiseMax(0.0).cwiseMin(high);
-  for (int step = 0; step < kMaxSteps; ++step) {
-    const SplineFrame frame = at(uv);
-    Eigen::Matrix2d plan;
-    plan << frame.by_u.head<2>(), frame.by_v.head<2>();
-    const Eigen::Vector2d before = uv;
-    uv += plan.inverse() * (xy - frame.point.head<2>());
-    uv = uv.cwiseMax(0.0).cwiseMin(high);
-    if ((uv - before).cwiseAbs().maxCoeff() < kShortStep * high.maxCoeff()) break;
-  }
+  const double near = kNear * (points.col(points.cols() - 1) - points.col(0)).norm();
+  if (search(*this, xy, uv) <= near) return uv;
+  // Where knots are far from even, a search may be stuck at a rim that is not the nearest.
+  Eigen::Vector2d other = parameters_beside(*this, xy);
+  if (search(*this, xy, other) <= near) return other;
   return uv;
 }
 

@@ -63,7 +63,10 @@ ObjectiveEvaluation WaveObjective::evaluate(const double* points, double* gradie
   result.energy.image = 0.0;
   result.energy.gradient = 0.0;
   const double share = 1.0 / static_cast<double>(parts_.size());
-  for (SplinePart<Executor>& part : parts_) add_picture(points, part, share, result, gradient);
+  for (SplinePart<Executor>& part : parts_) {
+    add_picture(points, part, share, result, gradient);
+    if (!result.feasible) break;
+  }
   return result;
 }
 
@@ -71,6 +74,10 @@ void WaveObjective::add_picture(const double* points, SplinePart<Executor>& part
                                 ObjectiveEvaluation& sum, double* gradient) {
   std::visit([&](auto& nodes) { nodes.look(points, positions_.data(), normals_.data()); }, part);
   const std::vector<double> flux = waves_->look(positions_.data(), normals_.data());
+  if (flux.empty()) {
+    sum.feasible = false;
+    return;
+  }
   const PictureError picture{columns_, rows_, error_.data()};
   const ComparePixel compare{flux.data(), target_.data(), total_, error_.data(), by_pixel_.data()};
   auto absolute = pending_sum<1>(executor_, "picture error", picture.count(), compare);

@@ -84,6 +84,9 @@ constexpr double kMergedIterations = 0.8;
 constexpr int kWaveRound = 20;
 constexpr double kWaveIterations = 0.4;
 
+/// Factor on WaveOptions::overlap: an optimiser puts light where the edges of tiles leave it out.
+constexpr double kMoreOverlap = 1.5;
+
 /// Merges every `merged` rounds into one, with `share` of their iterations in all.
 void merge_rounds(int merged, double share, Level& level) {
   const double iterations = share * level.rounds * level.iterations;
@@ -219,6 +222,7 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.objective.surface_height = task.options.thickness;
   if (level.waves) {
     problem.objective.waves = wave_options(task.options, task.setup);
+    problem.objective.waves->overlap *= kMoreOverlap;
     problem.aim = problem.target;
   }
   if (level.spline) {

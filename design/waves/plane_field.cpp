@@ -321,8 +321,8 @@ class NodesOnPixels {
         cell_(by_node_.cwiseAbs().rowwise().sum()) {
     const Eigen::Vector2d half =
         0.5 * by_node_.cwiseAbs() * Eigen::Vector2d(plan.columns, plan.rows) + cell_;
-    low = (to.centre - half).array().floor().cast<int>().max(to.pixels.min().array());
-    high = (to.centre + half).array().ceil().cast<int>().min(to.pixels.max().array());
+    low = (to.centre - half).array().floor().cast<int>().max(0);
+    high = (to.centre + half).array().ceil().cast<int>().min(to.pixels.array());
   }
 
   Eigen::Vector2i low;   ///< First pixel.
@@ -401,7 +401,7 @@ void PlaneField::pull(const OnPicture& to, std::span<const double> by_pixel) {
   const NodesOnPixels on(plan_, to);
   std::vector<double> bars;
   for (int row = on.low.y(); row < on.high.y(); ++row) {
-    const auto first = by_pixel.begin() + std::ptrdiff_t{row} * to.columns;
+    const auto first = by_pixel.begin() + std::ptrdiff_t{row} * to.pixels.x();
     if (!on.none()) bars.insert(bars.end(), first + on.low.x(), first + on.high.x());
   }
   const double doubled_area = 2.0 * plan_.step.prod();

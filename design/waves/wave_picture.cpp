@@ -11,7 +11,6 @@
 #include <span>
 #include <utility>
 #include <variant>
-#include <vector>
 
 #include "core/error.h"
 #include "core/optics/light_path.h"
@@ -103,17 +102,19 @@ class PointLightOf {
   }
 
   /// @param nodes  of every tile those of all surfaces in turn.
+  /// @param memory  by tile, surface and wavelength; may be null.
   /// @throw Interrupted.
-  void add(std::span<const Tile> tiles, const std::vector<SurfaceNodes>& nodes,
-           const Executor& executor) {
+  void add(std::span<const Tile> tiles, const std::vector<const SurfaceNodes*>& nodes,
+           const Executor& executor, TileMemory* memory) {
     const std::size_t colors = scene_.colors.size();
     const std::vector<std::size_t> first = first_equal(nodes);
     std::vector<std::vector<PixelLight>> lights(nodes.size() * colors);
     const auto work = [&](std::int64_t job) {
       const auto k = static_cast<std::size_t>(job);
       if (first[k / colors] != k / colors) return;
-      lights[k] = tile_light(scene_, scene_.colors[k % colors], nodes[k / colors],
-                             tiles[k / colors / surfaces_]);
+      lights[k] =
+          tile_light(scene_, scene_.colors[k % colors], *nodes[k / colors],
+                     tiles[k / colors / surfaces_], memory != nullptr ? memory + k : nullptr);
     };
     parallel_for(executor, "waves", static_cast<std::int64_t>(lights.size()), work, 1);
     if (scene_.control.stop_requested()) throw Interrupted();
@@ -135,14 +136,24 @@ class PointLightOf {
     return sum;
   }
 
+  /// Factors of the first surface's light in its picture, by wavelength.
+  [[nodiscard]] std::vector<double> scales() const {
+    std::vector<double> all;
+    for (std::size_t c = 0; c < scene_.colors.size(); ++c) {
+      all.push_back(pictures_[c].scale(scene_.colors[c]));
+    }
+    return all;
+  }
+
  private:
   /// For every surface of a tile the first that has the same nodes: a ball changes nothing where it
   /// reaches the surface.
-  [[nodiscard]] std::vector<std::size_t> first_equal(const std::vector<SurfaceNodes>& nodes) const {
+  [[nodiscard]] std::vector<std::size_t> first_equal(
+      const std::vector<const SurfaceNodes*>& nodes) const {
     std::vector<std::size_t> first(nodes.size());
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       first[k] = k - k % surfaces_;
-      while (first[k] < k && !same(nodes[first[k]], nodes[k])) ++first[k];
+      while (first[k] < k && !same(*nodes[first[k]], *nodes[k])) ++first[k];
     }
     return first;
   }
@@ -230,9 +241,26 @@ std::vector<Tile> wave_tiles(const WaveScene& scene, const OpticalSetup& setup, 
   };
   std::vector<Tile> tiles;
   for (const Stretch& y : along(cells.rows, 1)) {
-    for (const Stretch& x : along(cells.columns, 0)) tiles.push_back({x, y, {}});
+    for (const Stretch& x : along(cells.columns, 0)) tiles.push_back({x, y});
   }
   return tiles;
+}
+
+/// Adds the tiles batch by batch.
+/// @param nodes_of  makes the nodes of a batch of tiles.
+/// @param memory_of  TileMemory of the batch that begins with a tile, or null.
+template <class Nodes, class Memory>
+void add_tiles(const std::vector<Tile>& tiles, const WaveScene& scene, PointLightOf& light,
+               const Executor& executor, const Nodes& nodes_of, const Memory& memory_of) {
+  const auto count = static_cast<std::int64_t>(tiles.size());
+  for (std::int64_t first = 0; first < count; first += light.batch()) {
+    const std::int64_t size = std::min(light.batch(), count - first);
+    const auto begin = static_cast<std::size_t>(first);
+    const auto batch = std::span(tiles).subspan(begin, static_cast<std::size_t>(size));
+    light.add(batch, nodes_of(batch), executor, memory_of(begin));
+    scene.control.report(
+        {"waves", static_cast<double>(first + size), static_cast<double>(count), "tiles"});
+  }
 }
 
 }  // namespace
@@ -246,24 +274,24 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
   const WaveScene scene = scene_of(setup, kernel, options, control);
   const std::vector<Tile> tiles = wave_tiles(scene, setup, height, all_cells(grid), grid.spacing);
   PointLightOf light(scene, surfaces.size());
-  const auto count = static_cast<std::int64_t>(tiles.size());
-  for (std::int64_t first = 0; first < count; first += light.batch()) {
-    const std::int64_t size = std::min(light.batch(), count - first);
-    const auto batch =
-        std::span(tiles).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(size));
-    std::vector<SurfaceNodes> nodes;
+  std::vector<SurfaceNodes> sampled;
+  const auto sample = [&](std::span<const Tile> batch) {
+    sampled.clear();
     SurfacePatch patch;
     for (const Tile& tile : batch) {
       for (const SurfaceField* const surface : surfaces) {
         if (control.stop_requested()) throw Interrupted();
         surface->sample(window_of(grid, tile.cells(), 0), executor, patch);
-        nodes.push_back(nodes_of(patch));
+        sampled.push_back(nodes_of(patch));
       }
     }
-    light.add(batch, nodes, executor);
-    control.report(
-        {"waves", static_cast<double>(first + size), static_cast<double>(count), "tiles"});
-  }
+    std::vector<const SurfaceNodes*> nodes;
+    nodes.reserve(sampled.size());
+    for (const SurfaceNodes& one : sampled) nodes.push_back(&one);
+    return nodes;
+  };
+  const auto none = [](std::size_t /*tile*/) { return nullptr; };
+  add_tiles(tiles, scene, light, executor, sample, none);
   SourceBlurOn<Executor> blur(kernel, setup.pixels.x(), setup.pixels.y(), executor);
   std::vector<std::vector<double>> pictures;
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
@@ -274,220 +302,6 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
   return pictures;
 }
 
-namespace {
-
-/// How the picture is divided into patches, and how far from one rays count, all in √(λ f): the
-/// window is 1 up to kFlat and falls to 0 on kRamp. A portrait's picture is 1.6e-4 (MAE) from that
-/// in one piece; 1.1e-4 with 4 and 8 in three times the time, 3.2e-4 with patches of 8 in 1.5
-/// times.
-constexpr double kFlat = 3.0;
-constexpr double kRamp = 3.0;
-
-/// Every so many nodes show where the rays of all land.
-constexpr int kShownStride = 4;
-
-/// Patches of a picture, and which parts of a lens send rays to each.
-class PatchGrid {
- public:
-  /// @param unit  √(λ f), pixels along x and y. @param side  of a patch, units; 0: one patch, to
-  ///              which all rays count.
-  PatchGrid(const Eigen::Vector2i& pixels, const Eigen::Vector2d& unit, double side) {
-    if (side > 0.0) {
-      flat_ = kFlat * unit;
-      ramp_ = kRamp * unit;
-    }
-    for (int axis = 0; axis < 2; ++axis) {
-      const double most = side > 0.0 ? side * unit[axis] : HUGE_VAL;
-      const int count = std::max(1, static_cast<int>(std::lround(pixels[axis] / most)));
-      for (int k = 0; k <= count; ++k) edges_[axis].push_back(pixels[axis] * k / count);
-    }
-  }
-
-  [[nodiscard]] std::size_t count() const { return columns() * (edges_[1].size() - 1); }
-
-  [[nodiscard]] Patch patch(std::size_t k) const {
-    const std::size_t i = k % columns();
-    const std::size_t j = k / columns();
-    return {{Eigen::Vector2i(edges_[0][i], edges_[1][j]),
-             Eigen::Vector2i(edges_[0][i + 1], edges_[1][j + 1])},
-            flat_,
-            ramp_};
-  }
-
-  /// For each patch the box of the nodes' columns and rows from which rays get through its window.
-  /// @param nodes  all of a lens.
-  [[nodiscard]] std::vector<Eigen::AlignedBox2i> sources(const WaveColor& color,
-                                                         const SurfaceNodes& nodes,
-                                                         const Executor& executor) const {
-    std::vector<Eigen::Vector2d> landings(nodes.place.size());
-    parallel_for(executor, "landings", static_cast<std::int64_t>(landings.size()),
-                 [&](std::int64_t n) {
-                   const auto at = static_cast<std::size_t>(n);
-                   landings[at] = landing_of(color, nodes.place[at], nodes.slope[at]);
-                 });
-    std::vector<Eigen::AlignedBox2i> boxes(count());
-    for (std::size_t n = 0; n < landings.size(); ++n) {
-      if (!landings[n].allFinite()) continue;
-      const auto number = static_cast<std::int64_t>(n);
-      const Eigen::Vector2i node(static_cast<int>(number % nodes.columns),
-                                 static_cast<int>(number / nodes.columns));
-      const auto [left, right] = near(0, landings[n].x());
-      const auto [top, bottom] = near(1, landings[n].y());
-      for (std::size_t j = top; j < bottom; ++j) {
-        for (std::size_t i = left; i < right; ++i) {
-          boxes[j * columns() + i].extend(node);
-        }
-      }
-    }
-    return boxes;
-  }
-
- private:
-  [[nodiscard]] std::size_t columns() const { return edges_[0].size() - 1; }
-
-  /// First patch along an axis to whose window a place belongs, and one past the last.
-  [[nodiscard]] std::pair<std::size_t, std::size_t> near(int axis, double at) const {
-    const std::vector<int>& edges = edges_[axis];
-    const double margin = flat_[axis] + ramp_[axis];
-    const auto first = std::upper_bound(edges.begin() + 1, edges.end(), at - margin);
-    const auto last = std::lower_bound(edges.begin(), edges.end() - 1, at + margin);
-    return {static_cast<std::size_t>(first - edges.begin() - 1),
-            static_cast<std::size_t>(last - edges.begin())};
-  }
-
-  std::array<std::vector<int>, 2> edges_;  ///< Of the patches along x and y, pixels.
-  Eigen::Vector2d flat_{HUGE_VAL, HUGE_VAL}, ramp_{1.0, 1.0};
-};
-
-/// √(λ f) of the longest waves in pixels along x and y.
-Eigen::Vector2d wave_unit(const WaveScene& scene, double height) {
-  const OpticalSetup& setup = scene.colors.front().setup;
-  const double unit = diffraction_width(setup, height, scene.colors.back().wavelength);
-  return unit * setup.pixels.cast<double>().cwiseQuotient(setup.image_size);
-}
-
-/// The stretch of an axis of a grid around what a stretch of every `stride`-th node shows.
-/// @param last  node of the axis.
-Stretch stretch_around(int first_shown, int last_shown, int stride, std::int64_t last) {
-  const std::int64_t begin = std::max<std::int64_t>(std::int64_t{stride} * (first_shown - 1), 0);
-  const std::int64_t end = std::int64_t{stride} * (last_shown + 1);
-  // Shown nodes may end before the axis does.
-  const bool to_rim = end + stride > last;
-  // Windows of patches are zero at the nodes that a ramp of one cell leaves out.
-  return {begin, to_rim ? last : end, begin == 0 ? 0 : 1, to_rim ? 0 : 1};
-}
-
-/// The lit patches of a picture with their parts of the lens, for one wavelength after the other.
-/// @param nodes   every `stride`-th of each axis. @param size  columns and rows of all.
-/// @return by patch and wavelength; without cells where no light goes.
-std::vector<Tile> patch_tiles(const WaveScene& scene, const PatchGrid& grid,
-                              const SurfaceNodes& nodes, int stride, const CellCounts& size,
-                              const Executor& executor) {
-  const std::size_t colors = scene.colors.size();
-  std::vector<Tile> tiles(grid.count() * colors, Tile{{}, {}, {}});
-  for (std::size_t c = 0; c < colors; ++c) {
-    const auto boxes = grid.sources(scene.colors[c], nodes, executor);
-    for (std::size_t k = 0; k < boxes.size(); ++k) {
-      const Eigen::AlignedBox2i& box = boxes[k];
-      if (box.isEmpty()) continue;
-      tiles[k * colors + c] = {stretch_around(box.min().x(), box.max().x(), stride, size.x() - 1),
-                               stretch_around(box.min().y(), box.max().y(), stride, size.y() - 1),
-                               grid.patch(k)};
-    }
-  }
-  return tiles;
-}
-
-/// The cells of all tiles with a patch, and between them.
-CellRange cells_of(std::span<const Tile> tiles) {
-  CellRange all;
-  for (const Tile& tile : tiles) {
-    if (!tile.patch) continue;
-    const CellRange cells = tile.cells();
-    if (all.columns == 0) all = cells;
-    const std::int64_t right = std::max(all.column + all.columns, cells.column + cells.columns);
-    const std::int64_t top = std::max(all.row + all.rows, cells.row + cells.rows);
-    all.column = std::min(all.column, cells.column);
-    all.row = std::min(all.row, cells.row);
-    all.columns = right - all.column;
-    all.rows = top - all.row;
-  }
-  return all;
-}
-
-/// Pictures of one surface by wavelength, patch by patch.
-class PatchPictures {
- public:
-  explicit PatchPictures(const WaveScene& scene)
-      : scene_(scene),
-        pictures_(scene.colors.size(),
-                  {std::vector<double>(
-                       static_cast<std::size_t>(scene.colors.front().setup.pixels.prod()), 0.0),
-                   0.0}) {}
-
-  /// Adds `count` tiles from `first` on. @throw Interrupted.
-  void add(const std::vector<Tile>& tiles, std::size_t first, std::size_t count,
-           const SurfaceNodes& nodes, std::vector<PatchMemory>& memory, const Executor& executor) {
-    const std::size_t colors = scene_.colors.size();
-    std::vector<PixelLight> lights(count);
-    const auto work = [&](std::int64_t job) {
-      const auto k = static_cast<std::size_t>(job);
-      if (!tiles[first + k].patch) return;
-      lights[k] = patch_light(scene_, scene_.colors[(first + k) % colors], nodes, tiles[first + k],
-                              memory[first + k]);
-    };
-    parallel_for(executor, "waves", static_cast<std::int64_t>(lights.size()), work, 1);
-    if (scene_.control.stop_requested()) throw Interrupted();
-    const Eigen::Vector2i& pixels = scene_.colors.front().setup.pixels;
-    for (std::size_t k = 0; k < lights.size(); ++k) {
-      add_to(lights[k], pixels, pictures_[(first + k) % colors].flux);
-    }
-    scene_.control.report({"waves", static_cast<double>(first + count),
-                           static_cast<double>(tiles.size()), "patches"});
-  }
-
-  /// @param whole  all light of a wavelength.
-  void set_whole(std::size_t color, double whole) { pictures_[color].whole = whole; }
-
-  /// Factors of the wavelengths' light in the picture.
-  [[nodiscard]] std::vector<double> scales() const {
-    std::vector<double> all;
-    for (std::size_t c = 0; c < pictures_.size(); ++c) {
-      all.push_back(pictures_[c].scale(scene_.colors[c]));
-    }
-    return all;
-  }
-
-  [[nodiscard]] std::vector<double> sum() const {
-    std::vector<double> sum(pictures_.front().flux.size(), 0.0);
-    for (std::size_t c = 0; c < pictures_.size(); ++c) pictures_[c].add_to(scene_.colors[c], sum);
-    return sum;
-  }
-
- private:
-  const WaveScene& scene_;
-  std::vector<PointPicture> pictures_;
-};
-
-/// Light that a whole surface takes in, as its pictures' scale needs it.
-/// @param nodes  of the whole surface.
-double light_taken_in(const WaveColor& color, const SurfaceNodes& nodes) {
-  if (color.light.intake_is_plan_area()) return 0.0;
-  double sum = 0.0;
-  const auto last_row = static_cast<std::int64_t>(nodes.place.size()) / nodes.columns - 1;
-  for (std::int64_t j = 0; j < last_row; ++j) {
-    for (std::int64_t i = 0; i + 1 < nodes.columns; ++i) {
-      const Eigen::Vector3d &a = nodes.place[nodes.at(i, j)], &b = nodes.place[nodes.at(i + 1, j)],
-                            &c = nodes.place[nodes.at(i + 1, j + 1)],
-                            &d = nodes.place[nodes.at(i, j + 1)];
-      sum += flux_of(color.light, {a, b, c}) + flux_of(color.light, {a, c, d});
-    }
-  }
-  return sum;
-}
-
-}  // namespace
-
 /// What of a surface's waves stays while it changes, and what its last picture left.
 struct NodeWaves::State {
   State(const OpticalSetup& optics, const GridShape& shape, double height,
@@ -497,15 +311,15 @@ struct NodeWaves::State {
         executor(on),
         kernel(source_kernel(optics, height)),
         scene(scene_of(optics, kernel, options, control)),
-        blur(kernel, optics.pixels.x(), optics.pixels.y(), executor),
-        patches(scene.colors.front().setup.pixels, wave_unit(scene, height), options.patch),
-        memory(patches.count() * scene.colors.size()) {
+        blur(kernel, optics.pixels.x(), optics.pixels.y(), executor) {
     const Eigen::Vector2d cells(shape.columns - 1, shape.rows - 1);
     nodes.columns = shape.columns;
     nodes.spacing = optics.lens_size.cwiseQuotient(cells);
     nodes.place.resize(static_cast<std::size_t>(shape.columns) *
                        static_cast<std::size_t>(shape.rows));
     nodes.slope.resize(nodes.place.size());
+    tiles =
+        wave_tiles(scene, optics, height, {0, 0, shape.columns - 1, shape.rows - 1}, nodes.spacing);
   }
 
   WaveOptions options;
@@ -514,16 +328,16 @@ struct NodeWaves::State {
   SourceKernel kernel;
   WaveScene scene;
   SourceBlurOn<Executor> blur;
-  PatchGrid patches;
+  std::vector<Tile> tiles;
   SurfaceNodes nodes;
-  std::vector<Tile> tiles;          ///< patch_tiles() of the last look.
-  std::vector<double> scales;       ///< PointPicture::scale() of the last look, by wavelength.
-  std::vector<PatchMemory> memory;  ///< Of the tiles.
+  std::vector<double> scales;  ///< PointLightOf::scales()
+  std::vector<TileMemory>
+      memory;  ///< By tile and wavelength; without fields where there was no room.
 
   [[nodiscard]] double kept_bytes() const {
     double sum = 0.0;
-    for (const PatchMemory& of : memory) {
-      if (of.field) sum += of.field->bytes();
+    for (const TileMemory& of : memory) {
+      for (const PlaneField& field : of.fields) sum += field.bytes();
     }
     return sum;
   }
@@ -543,21 +357,28 @@ std::vector<double> NodeWaves::look(const double* positions, const double* norma
     s.nodes.place[n] = column3(positions, at);
     s.nodes.slope[n] = -normal.head<2>() / normal.z();
   }
-  const auto rows = static_cast<std::int64_t>(s.nodes.place.size()) / s.nodes.columns;
-  s.tiles = patch_tiles(s.scene, s.patches, s.nodes, 1, {s.nodes.columns, rows}, s.executor);
-  for (PatchMemory& memory : s.memory) memory.field.reset();
-  PatchPictures pictures(s.scene);
-  for (std::size_t first = 0; first < s.tiles.size(); first += kBatch) {
-    const std::size_t count = std::min<std::size_t>(kBatch, s.tiles.size() - first);
+  PointLightOf light(s.scene, 1);
+  const std::size_t colors = s.scene.colors.size();
+  s.memory.resize(s.tiles.size() * colors);
+  for (TileMemory& memory : s.memory) {
+    memory.fields.clear();
+    memory.strayed = false;
+  }
+  const auto nodes_of = [&](std::span<const Tile> batch) {
+    return std::vector<const SurfaceNodes*>(batch.size(), &s.nodes);
+  };
+  add_tiles(s.tiles, s.scene, light, s.executor, nodes_of, [&](std::size_t tile) {
+    TileMemory* const first = s.memory.data() + tile * colors;
     const bool keeps = s.kept_bytes() < kKeptBytes;
-    for (PatchMemory& of : std::span(s.memory).subspan(first, count)) of.keeps_field = keeps;
-    pictures.add(s.tiles, first, count, s.nodes, s.memory, s.executor);
-  }
-  for (std::size_t c = 0; c < s.scene.colors.size(); ++c) {
-    pictures.set_whole(c, light_taken_in(s.scene.colors[c], s.nodes));
-  }
-  s.scales = pictures.scales();
-  const std::vector<double> parts = pictures.sum();
+    const std::size_t count =
+        std::min(s.memory.size() - tile * colors, static_cast<std::size_t>(light.batch()) * colors);
+    for (TileMemory& memory : std::span(first, count)) memory.keeps_fields = keeps;
+    return first;
+  });
+  const auto strayed = [](const TileMemory& memory) { return memory.strayed; };
+  if (std::any_of(s.memory.begin(), s.memory.end(), strayed)) return {};
+  s.scales = light.scales();
+  const std::vector<double> parts = light.of(0);
   const std::span<const double> flux = s.blur.apply(s.executor, parts);
   return {flux.begin(), flux.end()};
 }
@@ -571,20 +392,18 @@ void NodeWaves::look_adjoint(std::span<const double> by_pixel, double* positions
     s.blur.apply_adjoint(s.executor, parts_bar);
   }
   const std::size_t colors = s.scene.colors.size();
-  std::vector<std::vector<double>> bars(s.tiles.size());
+  std::vector<std::vector<double>> bars(s.tiles.size() * colors);
   const auto work = [&](std::int64_t job) {
     const auto k = static_cast<std::size_t>(job);
-    if (!s.tiles[k].patch) return;
-    bars[k] = patch_heights_bar(s.scene, s.scene.colors[k % colors], s.nodes, s.tiles[k], parts_bar,
-                                s.memory[k]);
+    bars[k] = tile_heights_bar(s.scene, s.scene.colors[k % colors], s.nodes, s.tiles[k / colors],
+                               parts_bar, s.memory[k]);
   };
   parallel_for(s.executor, "waves adjoint", static_cast<std::int64_t>(bars.size()), work, 1);
   if (s.control.stop_requested()) throw Interrupted();
   std::vector<double> heights_bar(s.nodes.place.size(), 0.0);
   for (std::size_t k = 0; k < bars.size(); ++k) {
-    const CellRange cells = s.tiles[k].cells();
+    const CellRange cells = s.tiles[k / colors].cells();
     std::size_t from = 0;
-    if (bars[k].empty()) continue;
     for (std::int64_t row = cells.row; row <= cells.row + cells.rows; ++row) {
       for (std::int64_t column = cells.column; column <= cells.column + cells.columns; ++column) {
         heights_bar[s.nodes.at(column, row)] += s.scales[k % colors] * bars[k][from++];
@@ -596,42 +415,6 @@ void NodeWaves::look_adjoint(std::span<const double> by_pixel, double* positions
     column3(positions_bar, static_cast<std::int64_t>(n)) << -heights_bar[n] * s.nodes.slope[n],
         heights_bar[n];
   }
-}
-
-std::vector<double> smooth_wave_flux(const OpticalSetup& setup, const GridWindow& grid,
-                                     const SurfaceField& surface, const WaveOptions& options,
-                                     const Executor& executor, const RunControl& control) {
-  const double height = middle_height(grid, surface);
-  const SourceKernel kernel = source_kernel(setup, height);
-  const WaveScene scene = scene_of(setup, kernel, options, control);
-  const PatchGrid patches(scene.colors.front().setup.pixels, wave_unit(scene, height),
-                          options.patch);
-  GridWindow shown = grid;
-  shown.spacing *= kShownStride;
-  shown.columns = (grid.columns - 1) / kShownStride + 1;
-  shown.rows = (grid.rows - 1) / kShownStride + 1;
-  SurfacePatch patch;
-  surface.sample(shown, executor, patch);
-  const SurfaceNodes few = nodes_of(patch);
-  const std::vector<Tile> tiles =
-      patch_tiles(scene, patches, few, kShownStride, {grid.columns, grid.rows}, executor);
-  PatchPictures pictures(scene);
-  std::vector<PatchMemory> memory(tiles.size());
-  for (std::size_t first = 0; first < tiles.size(); first += kBatch) {
-    if (control.stop_requested()) throw Interrupted();
-    const auto batch = std::span(tiles).subspan(first);
-    const std::size_t count = std::min<std::size_t>(kBatch, batch.size());
-    // The parts of neighbours overlap.
-    surface.sample(window_of(grid, cells_of(batch.first(count)), 0), executor, patch);
-    pictures.add(tiles, first, count, nodes_of(patch), memory, executor);
-  }
-  for (std::size_t c = 0; c < scene.colors.size(); ++c) {
-    pictures.set_whole(c, light_taken_in(scene.colors[c], few));
-  }
-  SourceBlurOn<Executor> blur(kernel, setup.pixels.x(), setup.pixels.y(), executor);
-  const std::vector<double> parts = pictures.sum();
-  const std::span<const double> flux = blur.apply(executor, parts);
-  return {flux.begin(), flux.end()};
 }
 
 double wave_seconds(const OpticalSetup& setup, double wavelength) {

@@ -16,8 +16,8 @@
 
 namespace lensforge {
 
-/// The picture by waves of a smooth surface that is given by its nodes, and the adjoint; for a
-/// design's loop. As smooth_wave_flux(), on a grid that need not be even.
+/// The picture by waves of a surface that is given by its nodes, and the adjoint; for a design's
+/// loop. Tiles are as in wave_flux(), on a grid that need not be even.
 class NodeWaves {
  public:
   /// @param nodes  along x and y; the outermost are on the lens's rim. @param height  of the
@@ -29,11 +29,12 @@ class NodeWaves {
   NodeWaves& operator=(const NodeWaves&) = delete;
   ~NodeWaves();
 
-  /// The picture. @param positions, normals  three numbers a node; normals of
-  /// any length, z > 0. @throw Interrupted.
+  /// The picture, as of wave_flux(); none if rays went so far apart since the last look that it
+  /// would take many times as long. @param positions, normals  three numbers a node; normals of any
+  /// length, z > 0. @throw Interrupted.
   std::vector<double> look(const double* positions, const double* normals);
   /// Derivatives of Σ by_pixel · flux of the last look() by the positions. Slopes follow heights;
-  /// see patch_heights_bar() for what is left out. @throw Interrupted.
+  /// see tile_heights_bar() for what is left out. @throw Interrupted.
   void look_adjoint(std::span<const double> by_pixel, double* positions_bar);
 
  private:
@@ -69,14 +70,6 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
                                            std::span<const SurfaceField* const> surfaces,
                                            const WaveOptions& options, const Executor& executor,
                                            const RunControl& control);
-
-/// The same for one surface that bends over no less than √(λ f): without tool marks. The picture is
-/// divided instead of the lens: of each patch's light all that interferes is in one field, with a
-/// window by where the rays land, so that nothing is lost at the edges of patches but what is
-/// scattered more than a few √(λ f) from its ray.
-std::vector<double> smooth_wave_flux(const OpticalSetup& setup, const GridWindow& grid,
-                                     const SurfaceField& surface, const WaveOptions& options,
-                                     const Executor& executor, const RunControl& control);
 
 /// Processor seconds of one surface's picture in one wavelength, about, on 2 GHz cores: 128² on 25
 /// mm at 75 mm take 15.

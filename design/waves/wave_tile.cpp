@@ -26,7 +26,7 @@ constexpr double kSpread = 4.0;
 constexpr double kEdgeSpread = 11.0;
 
 /// Points across a node's cell at a hard edge.
-constexpr int kEdgePoints = 8;
+constexpr int kEdgePoints = 4;
 
 /// Larger fields are not made: what is steepest in them goes as rays if it is little, or if
 /// quarters of the tile would overlap too little; else the tile is divided. A 128² portrait that
@@ -36,16 +36,17 @@ constexpr double kMostNodes = 4e7;
 constexpr double kLittle = 0.005;   ///< Share of a tile's light.
 constexpr double kLeastRamp = 1.0;  ///< In √(λ f).
 
-/// The same for patches, which are not divided: 8 bytes each. As many are in 150 mm of lens before
-/// a wall at 75 mm, if all its light goes to one patch.
-constexpr double kMostPatchNodes = 4e8;
-
 /// Magnifications that are tried: so many either side of 1, up to the most.
 constexpr int kMagnifications = 12;
 constexpr double kMostWider = 8.0;
 
-/// Room in a patch's plan for its rays to change, as a factor.
+/// Room for rays to change in a plan that is kept, as a factor; one that is used less than by
+/// kLeastUse is made anew: a step that went too far may have left it.
 constexpr double kSlack = 1.05;
+constexpr double kLeastUse = 0.6;
+
+/// A tile that needs so many times more nodes than before has strayed: it is not followed.
+constexpr double kMostGrowth = 8.0;
 
 /// From this share of the steepest direction kept on, waves fade into rays.
 constexpr double kFade = 0.8;
@@ -56,17 +57,28 @@ std::optional<IncidentRay> incident_ray(const LightPath& light, const Eigen::Vec
   return light.ray_to(p);
 }
 
+/// Light on a triangle of the surface, as a share of all.
+double flux_of(const LightPath& light, const Corners& t) {
+  if (!light.varies()) return light.flux(t);
+  const IncidentRay a = light.ray_to(t.v0);
+  const IncidentRay b = light.ray_to(t.v1);
+  const IncidentRay c = light.ray_to(t.v2);
+  return light.flux(t, {&a, &b, &c});
+}
+
 /// One tile's way from the surface to the screen.
 class WaveTile {
  public:
-  /// @param plan  of an earlier look, to be used if it fits; null: a new one is made.
+  /// @param plan   of an earlier look, to be used if it fits; null: a new one is made.
+  /// @param slack  room in a new one, as a factor.
   WaveTile(const WaveScene& scene, const WaveColor& color, const SurfaceNodes& surface,
-           const Tile& tile, const TilePlan* plan)
+           const Tile& tile, const TilePlan* plan, double slack)
       : color_(color),
         options_(scene.options),
         edge_(scene.edge ? &*scene.edge : nullptr),
         surface_(surface),
         tile_(tile),
+        slack_(slack),
         columns_(static_cast<int>(tile.x.nodes())),
         rows_(static_cast<int>(tile.y.nodes())) {
     trace(plan);
@@ -91,7 +103,7 @@ class WaveTile {
     const OnPicture to = on_picture();
     PixelLight light = field.spread(to);
     light.whole = whole_;
-    if (as_rays_ > 0.0) add_rays(to.pixels, light);
+    if (as_rays_ > 0.0) add_rays(light);
     return light;
   }
 
@@ -182,14 +194,32 @@ class WaveTile {
     return (node == 0 && axis.rise == 0) || (node == axis.nodes() - 1 && axis.fall == 0);
   }
 
-  /// True if the rays stay inside a patch's plan. What goes as rays does so for good.
+  /// True if the rays stay inside the plan and need most of it.
   [[nodiscard]] bool fits() const {
-    if (plan_.limited) return true;
-    return std::all_of(nodes_.begin(), nodes_.end(), [&](const Node& node) {
-      return !is_bright(node) || ((from_centre(node).array().abs() <= plan_.start.array()).all() &&
-                                  (landing(node).array().abs() <= plan_.far.array()).all() &&
-                                  (node.laid.cosine.array().abs() <= plan_.steepest.array()).all());
-    });
+    const Extents now = extents();
+    const auto within = [](const Eigen::Vector2d& needed, const Eigen::Vector2d& planned) {
+      return (needed.array() <= planned.array()).all() &&
+             (needed.array() >= kLeastUse * planned.array()).all();
+    };
+    return within(now.start, plan_.start) && within(now.far, plan_.far) &&
+           within(now.steepest + plan_.spread, plan_.steepest + plan_.spread);
+  }
+
+  /// How far laid rays go.
+  struct Extents {
+    Eigen::Vector2d start{0.0, 0.0};  ///< From the field's centre, mm.
+    Eigen::Vector2d far{0.0, 0.0};    ///< Where they land, mm before magnification.
+    Eigen::Vector2d steepest{1e-9, 1e-9};
+  };
+  [[nodiscard]] Extents extents() const {
+    Extents all;
+    for (const Node& node : nodes_) {
+      if (!is_bright(node)) continue;
+      all.start = all.start.cwiseMax(from_centre(node).cwiseAbs());
+      all.far = all.far.cwiseMax(landing(node).cwiseAbs());
+      all.steepest = all.steepest.cwiseMax(node.laid.cosine.cwiseAbs());
+    }
+    return all;
   }
 
   void lay_rays() {
@@ -233,7 +263,6 @@ class WaveTile {
     // An outline's edge fades over one step of the rays, far below √(λ f).
     const bool in = edge_ == nullptr || edge_->contains(xy);
     node.window = in ? tile_.x.window(tile_.x.begin + i) * tile_.y.window(tile_.y.begin + j) : 0.0;
-    if (tile_.patch) node.window *= tile_.patch->window(light.land(p, node.slope));
   }
 
   static bool is_bright(const Node& node) { return node.lit && node.window > 0.0; }
@@ -333,88 +362,70 @@ class WaveTile {
     });
   }
 
-  void add_rays(const Eigen::AlignedBox2i& pixels, PixelLight& light) const {
+  void add_rays(PixelLight& light) const {
     for_each_ray([&](const Three& t, double flux) {
       std::array<Eigen::Vector2d, 3> places;
       for (std::size_t k = 0; k < 3; ++k) {
         places[k] = color_.light.land(corners_[index(t[k])], nodes_[index(t[k])].slope);
       }
-      add_ray(places, flux, pixels, light);
+      add_ray(places, flux, light);
     });
   }
 
   /// Divides a triangle on the picture until it is smaller than half a pixel.
-  void add_ray(const std::array<Eigen::Vector2d, 3>& t, double flux,
-               const Eigen::AlignedBox2i& pixels, PixelLight& light) const {
+  void add_ray(const std::array<Eigen::Vector2d, 3>& t, double flux, PixelLight& light) const {
+    const Eigen::Vector2i pixels(color_.screen.plane().columns(), color_.screen.plane().rows());
     Eigen::AlignedBox2d box;
     for (const Eigen::Vector2d& corner : t) box.extend(corner);
-    if (!box.intersects(pixels.cast<double>())) return;
+    if ((box.max().array() <= 0.0).any() ||
+        (box.min().array() >= pixels.cast<double>().array()).any()) {
+      return;
+    }
     if (box.sizes().maxCoeff() > 0.5) {
       const std::array<Eigen::Vector2d, 3> m{0.5 * (t[0] + t[1]), 0.5 * (t[1] + t[2]),
                                              0.5 * (t[2] + t[0])};
-      add_ray({t[0], m[0], m[2]}, 0.25 * flux, pixels, light);
-      add_ray({m[0], t[1], m[1]}, 0.25 * flux, pixels, light);
-      add_ray({m[2], m[1], t[2]}, 0.25 * flux, pixels, light);
-      add_ray(m, 0.25 * flux, pixels, light);
+      add_ray({t[0], m[0], m[2]}, 0.25 * flux, light);
+      add_ray({m[0], t[1], m[1]}, 0.25 * flux, light);
+      add_ray({m[2], m[1], t[2]}, 0.25 * flux, light);
+      add_ray(m, 0.25 * flux, light);
       return;
     }
     const Eigen::Vector2i at = ((t[0] + t[1] + t[2]) / 3.0).array().floor().cast<int>();
-    if ((at.array() < pixels.min().array()).any() || (at.array() >= pixels.max().array()).any()) {
-      return;
-    }
-    light.rays.emplace_back(at.y() * color_.screen.plane().columns() + at.x(), flux);
+    if ((at.array() < 0).any() || (at.array() >= pixels.array()).any()) return;
+    light.rays.emplace_back(at.y() * pixels.x() + at.x(), flux);
   }
 
   /// Size of the field: as wide as the light on the starting plane and as that on the screen, each
-  /// around the mean ray, which for a patch goes to its middle.
+  /// around the mean ray.
   void make_plan() {
     Eigen::AlignedBox2d start;
     for (const Node& node : nodes_) {
       if (is_bright(node)) start.extend(node.q);
     }
     const Eigen::Vector2d centre = start.center();
-    const Eigen::Vector2d to =
-        tile_.patch ? tile_.patch->pixels.cast<double>().center() : landing_along(mean_, centre);
-    const Eigen::Vector3d far = color_.screen.at(to);
-    plan_.far_level = far.z();
-    const double distance = plan_.far_level - plan_.level;
     FieldPlan& field = plan_.field;
     field.cosine = mean_;
-    if (tile_.patch) {
-      const Eigen::Vector2d slope = (far.head<2>() - centre) / distance;
-      field.cosine = slope / std::sqrt(1.0 + slope.squaredNorm());
-    }
-    field.distance = distance;
     field.centre = centre;
+    const Eigen::Vector2d to =
+        color_.light.land({centre.x(), centre.y(), plan_.level}, field.slope());
+    plan_.far_level = color_.screen.at(to).z();
+    field.distance = plan_.far_level - plan_.level;
     field.wavelength = color_.wavelength;
     field.magnification = best_magnification();
     plan_.spread = spread(field.magnification);
     lay_rays();
     field.points = {is_cut(tile_.x) ? kEdgePoints : 1, is_cut(tile_.y) ? kEdgePoints : 1};
-    plan_.steepest.setConstant(1e-9);
-    Eigen::Vector2d farthest = Eigen::Vector2d::Zero();
-    for (const Node& node : nodes_) {
-      if (!is_bright(node)) continue;
-      plan_.steepest = plan_.steepest.cwiseMax(node.laid.cosine.cwiseAbs());
-      farthest = farthest.cwiseMax(from_centre(node).cwiseAbs());
-    }
-    if (tile_.patch) plan_.steepest *= kSlack;
-    plan_nodes(farthest);
-    const double most = tile_.patch ? kMostPatchNodes : kMostNodes;
+    const Extents now = extents();
+    plan_.steepest = slack_ * now.steepest;
+    plan_.limited = false;
+    plan_nodes(now.start);
     // Below the spread of the waves, giving up more rays would save little.
-    while (node_count() > most && options_.tile > 0.0 &&
+    while (node_count() > kMostNodes && options_.tile > 0.0 &&
            (plan_.steepest.array() > plan_.spread.array()).any()) {
       plan_.limited = true;
       plan_.steepest *= 0.9;
-      plan_nodes(farthest);
+      plan_nodes(now.start);
     }
-  }
-
-  /// Pixel coordinates where a ray from a place on the starting plane lands.
-  [[nodiscard]] Eigen::Vector2d landing_along(const Eigen::Vector2d& cosine,
-                                              const Eigen::Vector2d& place) const {
-    const Eigen::Vector2d slope = cosine / std::sqrt(1.0 - cosine.squaredNorm());
-    return color_.light.land({place.x(), place.y(), plan_.level}, slope);
   }
 
   [[nodiscard]] double node_count() const {
@@ -461,10 +472,7 @@ class WaveTile {
   /// @param start, far  farthest that light is on either plane, before magnification.
   [[nodiscard]] Eigen::Vector2d field_size(const Eigen::Vector2d& start, const Eigen::Vector2d& far,
                                            const Eigen::Vector2d& magnification) const {
-    if (!tile_.patch) return 2.0 * start.cwiseMax(far) + room(magnification);
-    // What is cyclic beside the patch does no harm.
-    const Eigen::Vector2d patch = half_patch().cwiseQuotient(magnification);
-    return (2.0 * start).cwiseMax(patch + far + scattered(magnification));
+    return 2.0 * start.cwiseMax(far) + room(magnification);
   }
   [[nodiscard]] Eigen::Vector2d scattered(const Eigen::Vector2d& magnification) const {
     return (plan_.field.distance * spread(magnification)).cwiseQuotient(magnification);
@@ -500,32 +508,13 @@ class WaveTile {
       }
     }
     const Eigen::Vector2d& wider = field.magnification;
-    if (tile_.patch) {
-      plan_.start = kSlack * start;
-      plan_.far = kSlack * farthest;
-      field.reach = plan_.far + plan_.start + scattered(wider);
-    } else {
-      plan_.start = start;
-      plan_.far = farthest;
-      field.reach = farthest + start + room(wider);
-    }
+    plan_.start = slack_ * start;
+    plan_.far = slack_ * farthest;
+    field.reach = plan_.far + plan_.start + room(wider);
     const Eigen::Vector2d size = field_size(plan_.start, plan_.far, wider);
     field.step = step_of(plan_.steepest, wider);
     field.columns = transform_size(size.x() / field.step.x());
     field.rows = transform_size(size.y() / field.step.y());
-  }
-
-  /// Half the size of the patch, seen from the mean ray, mm.
-  [[nodiscard]] Eigen::Vector2d half_patch() const {
-    Eigen::Vector2d half = Eigen::Vector2d::Zero();
-    const Eigen::AlignedBox2d box = tile_.patch->pixels.cast<double>();
-    const Eigen::Vector3d middle = color_.screen.at(box.center());
-    for (const auto corner : {Eigen::AlignedBox2d::BottomLeft, Eigen::AlignedBox2d::BottomRight,
-                              Eigen::AlignedBox2d::TopLeft, Eigen::AlignedBox2d::TopRight}) {
-      const Eigen::Vector3d to = color_.screen.at(box.corner(corner)) - middle;
-      half = half.cwiseMax((to.head<2>() - to.z() * plan_.field.slope()).cwiseAbs());
-    }
-    return half;
   }
 
   /// True if it ends at the lens's rim, where no window fades the light.
@@ -558,9 +547,7 @@ class WaveTile {
     Eigen::Matrix2d by_mm;
     by_mm << land(centre + Eigen::Vector2d::UnitX()) - at,
         land(centre + Eigen::Vector2d::UnitY()) - at;
-    const Eigen::Vector2i all(color_.screen.plane().columns(), color_.screen.plane().rows());
-    return {at, by_mm, all.x(),
-            tile_.patch ? tile_.patch->pixels : Eigen::AlignedBox2i(Eigen::Vector2i::Zero(), all)};
+    return {at, by_mm, {color_.screen.plane().columns(), color_.screen.plane().rows()}};
   }
 
   const WaveColor& color_;
@@ -568,6 +555,7 @@ class WaveTile {
   const OutlineIndex* edge_;
   const SurfaceNodes& surface_;
   Tile tile_;
+  double slack_;
   int columns_, rows_;
   std::vector<Node> nodes_;
   std::vector<Eigen::Vector3d> corners_;
@@ -577,74 +565,69 @@ class WaveTile {
   TilePlan plan_;
 };
 
-/// Adds the light of a tile, or of its quarters if its field would be too large.
-void add_tile(const WaveScene& scene, const WaveColor& color, const SurfaceNodes& nodes,
-              const Tile& tile, std::vector<PixelLight>& parts) {
+double node_count(const TilePlan& plan) {
+  return static_cast<double>(plan.field.columns) * static_cast<double>(plan.field.rows);
+}
+
+/// Calls `take(part)` for a tile that is lit, or for its quarters if its field would be too large.
+/// @param memory  of the tile; null: nothing is kept.
+template <class Take>
+void for_each_part(const WaveScene& scene, const WaveColor& color, const SurfaceNodes& nodes,
+                   const Tile& tile, TileMemory* memory, const Take& take) {
   if (scene.control.stop_requested()) return;
-  const WaveTile whole(scene, color, nodes, tile, nullptr);
+  const bool known = memory != nullptr && memory->plan;
+  const WaveTile whole(scene, color, nodes, tile, known ? &*memory->plan : nullptr,
+                       memory != nullptr ? kSlack : 1.0);
   if (whole.is_dark()) return;
-  if (!whole.plan().divided) {
-    parts.push_back(whole.light(whole.on_screen()));
+  const TilePlan& plan = whole.plan();
+  if (known && node_count(plan) > kMostGrowth * node_count(*memory->plan)) {
+    memory->strayed = true;
+    return;
+  }
+  if (memory != nullptr) {
+    memory->plan.reset();
+    if (!plan.limited) memory->plan = plan;
+  }
+  if (!plan.divided) {
+    take(whole);
     return;
   }
   for (const Stretch& y : tile.y.halves()) {
-    for (const Stretch& x : tile.x.halves()) add_tile(scene, color, nodes, {x, y, {}}, parts);
+    for (const Stretch& x : tile.x.halves()) {
+      for_each_part(scene, color, nodes, {x, y}, nullptr, take);
+    }
   }
 }
 
 }  // namespace
 
-double flux_of(const LightPath& light, const Corners& t) {
-  if (!light.varies()) return light.flux(t);
-  const IncidentRay a = light.ray_to(t.v0);
-  const IncidentRay b = light.ray_to(t.v1);
-  const IncidentRay c = light.ray_to(t.v2);
-  return light.flux(t, {&a, &b, &c});
-}
-
-Eigen::Vector2d landing_of(const WaveColor& color, const Eigen::Vector3d& place,
-                           const Eigen::Vector2d& slope) {
-  const Eigen::Vector3d normal = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
-  const std::optional<IncidentRay> ray = incident_ray(color.light, place);
-  const IncidentRay* const known = ray ? &*ray : nullptr;
-  if (!color.light.transmits(place, normal, known)) return Eigen::Vector2d::Constant(NAN);
-  return color.light.land(place, color.light.beam(place, normal, known).m);
-}
-
 std::vector<PixelLight> tile_light(const WaveScene& scene, const WaveColor& color,
-                                   const SurfaceNodes& nodes, const Tile& tile) {
+                                   const SurfaceNodes& nodes, const Tile& tile,
+                                   TileMemory* memory) {
   std::vector<PixelLight> parts;
-  add_tile(scene, color, nodes, tile, parts);
+  for_each_part(scene, color, nodes, tile, memory, [&](const WaveTile& part) {
+    PlaneField field = part.on_screen();
+    parts.push_back(part.light(field));
+    if (memory != nullptr && memory->keeps_fields) memory->fields.push_back(std::move(field));
+  });
   return parts;
 }
 
-PixelLight patch_light(const WaveScene& scene, const WaveColor& color, const SurfaceNodes& nodes,
-                       const Tile& tile, PatchMemory& memory) {
-  if (scene.control.stop_requested()) return {};
-  const WaveTile patch(scene, color, nodes, tile, memory.plan ? &*memory.plan : nullptr);
-  if (patch.is_dark()) return {};
-  memory.plan = patch.plan();
-  PlaneField field = patch.on_screen();
-  PixelLight light = patch.light(field);
-  if (memory.keeps_field) memory.field.emplace(std::move(field));
-  return light;
-}
-
-std::vector<double> patch_heights_bar(const WaveScene& scene, const WaveColor& color,
-                                      const SurfaceNodes& nodes, const Tile& tile,
-                                      std::span<const double> by_pixel, PatchMemory& memory) {
+std::vector<double> tile_heights_bar(const WaveScene& scene, const WaveColor& color,
+                                     const SurfaceNodes& nodes, const Tile& tile,
+                                     std::span<const double> by_pixel, TileMemory& memory) {
   const auto columns = static_cast<std::size_t>(tile.x.nodes());
   std::vector<double> bars(columns * static_cast<std::size_t>(tile.y.nodes()), 0.0);
-  if (scene.control.stop_requested()) return bars;
-  const WaveTile patch(scene, color, nodes, tile, memory.plan ? &*memory.plan : nullptr);
-  if (patch.is_dark()) return bars;
-  PlaneField field = memory.field ? std::move(*memory.field) : patch.on_screen();
-  memory.field.reset();
-  patch.heights_bar(std::move(field), by_pixel,
-                    [&](std::int64_t column, std::int64_t row, double bar) {
-                      bars[static_cast<std::size_t>(row - tile.y.begin) * columns +
-                           static_cast<std::size_t>(column - tile.x.begin)] += bar;
-                    });
+  const auto add = [&](std::int64_t column, std::int64_t row, double bar) {
+    bars[static_cast<std::size_t>(row - tile.y.begin) * columns +
+         static_cast<std::size_t>(column - tile.x.begin)] += bar;
+  };
+  std::vector<PlaneField> kept = std::exchange(memory.fields, {});
+  std::size_t next = 0;
+  for_each_part(scene, color, nodes, tile, &memory, [&](const WaveTile& part) {
+    PlaneField field = kept.empty() ? part.on_screen() : std::move(kept[next++]);
+    part.heights_bar(std::move(field), by_pixel, add);
+  });
   return bars;
 }
 

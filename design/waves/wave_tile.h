@@ -67,10 +67,9 @@ int transform_size(double least);
 
 /// How a plane lies on a picture.
 struct OnPicture {
-  Eigen::Vector2d centre;      ///< Pixel coordinates of the field's centre.
-  Eigen::Matrix2d by_mm;       ///< Their derivatives.
-  int columns = 0;             ///< Of the picture.
-  Eigen::AlignedBox2i pixels;  ///< That count, the last excluded.
+  Eigen::Vector2d centre;  ///< Pixel coordinates of the field's centre.
+  Eigen::Matrix2d by_mm;   ///< Their derivatives.
+  Eigen::Vector2i pixels;  ///< Columns and rows of the picture.
 };
 
 /// Light of a rectangle of pixels.
@@ -204,30 +203,8 @@ struct Stretch {
   }
 };
 
-/// Pixels whose light is made by the rays that land there or near, with a window that falls with
-/// the distance of a ray's pixel coordinates.
-struct Patch {
-  Eigen::AlignedBox2i pixels;  ///< The last excluded.
-  Eigen::Vector2d flat;        ///< Distance up to which the window is 1, pixels.
-  Eigen::Vector2d ramp;        ///< On which it falls to 0 then, pixels.
-
-  [[nodiscard]] double window(const Eigen::Vector2d& at) const {
-    return along(at, 0) * along(at, 1);
-  }
-
- private:
-  [[nodiscard]] double along(const Eigen::Vector2d& at, int axis) const {
-    const double away = std::max(pixels.min()[axis] - at[axis], at[axis] - pixels.max()[axis]);
-    if (away <= flat[axis]) return 1.0;
-    const double share = (away - flat[axis]) / ramp[axis];
-    return share < 1.0 ? 0.5 + 0.5 * std::cos(std::numbers::pi * share) : 0.0;
-  }
-};
-
-/// A part of a lens.
 struct Tile {
   Stretch x, y;
-  std::optional<Patch> patch;  ///< Only its pixels are of interest.
 
   [[nodiscard]] CellRange cells() const {
     return {x.begin, y.begin, x.end - x.begin, y.end - y.begin};
@@ -308,13 +285,6 @@ struct WaveScene {
   std::optional<OutlineIndex> edge;  ///< Of a lens with an outline.
 };
 
-/// Light on a triangle of the surface, as a share of all.
-double flux_of(const LightPath& light, const Corners& t);
-
-/// Pixel coordinates where the ray from a place of the surface lands; not a number if it is dark.
-Eigen::Vector2d landing_of(const WaveColor& color, const Eigen::Vector3d& place,
-                           const Eigen::Vector2d& slope);
-
 /// How a tile's field is laid.
 struct TilePlan {
   bool divided = false;                ///< Its quarters show it better.
@@ -328,34 +298,32 @@ struct TilePlan {
   FieldPlan field;
 };
 
-/// Light that a tile of a surface sends to the pixels, of its quarters if its field would be too
-/// large. Nothing if the scene's control asks to stop.
-/// @param nodes  of the tile and around. @pre the tile has no patch.
-std::vector<PixelLight> tile_light(const WaveScene& scene, const WaveColor& color,
-                                   const SurfaceNodes& nodes, const Tile& tile);
-
-/// What is kept of a patch from one look at its surface to the next.
-struct PatchMemory {
-  /// Stays while the rays fit it: pictures jump by some 1e-4 where the size of a field does.
+/// What is kept of a tile from one look at its surface to the next.
+struct TileMemory {
+  /// Stays while the rays fit it: pictures jump by some 1e-4 where the size of a field does. None
+  /// if the tile was divided, or some of its light went as rays.
   std::optional<TilePlan> plan;
-  bool keeps_field = false;
-  std::optional<PlaneField> field;  ///< On the screen, for patch_heights_bar(), which uses it up.
+  /// True if the rays went so much farther apart than before that nothing was made.
+  bool strayed = false;
+  bool keeps_fields = false;
+  std::vector<PlaneField> fields;  ///< On the screen, for tile_heights_bar(), which uses them up.
 };
 
-/// Light of a patch. Nothing if the scene's control asks to stop.
-/// @param tile  all nodes whose rays the window leaves, and a cell around.
-PixelLight patch_light(const WaveScene& scene, const WaveColor& color, const SurfaceNodes& nodes,
-                       const Tile& tile, PatchMemory& memory);
+/// Light that a tile of a surface sends to the pixels, of its quarters if its field would be too
+/// large. Nothing if the scene's control asks to stop.
+/// @param nodes  of the tile and around. @param memory  may be null.
+std::vector<PixelLight> tile_light(const WaveScene& scene, const WaveColor& color,
+                                   const SurfaceNodes& nodes, const Tile& tile,
+                                   TileMemory* memory = nullptr);
 
-/// Derivatives of Σ by_pixel · light of a patch by the heights of the tile's nodes at their places,
-/// row by row. A height changes the optical path of the ray through it, which is stationary
-/// (Fermat); that it also changes the amplitude on the starting plane, by D q² / 2k of that for
-/// ripples of wave number q and D from the surface to the plane, is left out, as are the window's
-/// changes and light that goes as rays.
+/// Derivatives of Σ by_pixel · light by the heights of the tile's nodes at their places, row by
+/// row. A height changes the optical path of the ray through it, which is stationary (Fermat); that
+/// it also changes the amplitude on the starting plane, by D q² / 2k of that for ripples of wave
+/// number q and D from the surface to the plane, is left out, as is light that goes as rays.
 /// @param by_pixel  of all pixels of color.setup, row by row from the top.
-/// @param memory    of patch_light() for the same nodes.
-std::vector<double> patch_heights_bar(const WaveScene& scene, const WaveColor& color,
-                                      const SurfaceNodes& nodes, const Tile& tile,
-                                      std::span<const double> by_pixel, PatchMemory& memory);
+/// @param memory    of tile_light() for the same nodes.
+std::vector<double> tile_heights_bar(const WaveScene& scene, const WaveColor& color,
+                                     const SurfaceNodes& nodes, const Tile& tile,
+                                     std::span<const double> by_pixel, TileMemory& memory);
 
 }  // namespace lensforge

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -87,6 +88,30 @@ TEST(ControlNet, FindsTheParametersOfAPoint) {
     EXPECT_LT((net.parameters_of(xy, uv + Eigen::Vector2d(0.3, -0.3)) - uv).norm(), 1e-11);
   }
   EXPECT_LT(net.parameters_of({-1e-12, 0.0}, {0.5, 0.5}).norm(), 1e-12);
+}
+
+/// Knots that crowd in places, as a drawing's do: a guess by even ones is far off.
+TEST(ControlNet, FindsParametersAmongCrowdedKnots) {
+  constexpr int kCells = 60;
+  ControlNet net{{kCells + 3, kCells + 3}, Eigen::Matrix3Xd(3, (kCells + 3) * (kCells + 3))};
+  std::mt19937 random(4);
+  const auto place = [](double along, double across) {
+    const double t = (along - 1.0) / kCells;
+    const double bent = t + 0.115 * std::sin(2.0 * std::numbers::pi * t) *
+                                (1.0 + 0.3 * std::sin(5.0 * across / kCells));
+    return 20.0 * (bent + 0.028 * std::sin(6.0 * std::numbers::pi * t));
+  };
+  for (int j = 0; j < net.shape.rows; ++j) {
+    for (int i = 0; i < net.shape.columns; ++i) {
+      net.points.col(Eigen::Index{j} * net.shape.columns + i) << place(i, j), place(j, i), 5.0;
+    }
+  }
+  for (int k = 0; k < 500; ++k) {
+    const Eigen::Vector2d uv = random_parameters(net, random);
+    const Eigen::Vector2d xy = net.at(uv).point.head<2>();
+    const Eigen::Vector2d even = xy / 20.0 * kCells;
+    EXPECT_LT((net.at(net.parameters_of(xy, even)).point.head<2>() - xy).norm(), 1e-9) << xy;
+  }
 }
 
 TEST(ControlNet, NodesAreThePointsAtEvenParameters) {

@@ -91,7 +91,7 @@ double weighted(const std::vector<double>& flux, const std::vector<double>& w) {
 constexpr double kBump = -1e-4;
 
 double by_difference(const OpticalSetup& setup, const Eigen::Vector2d& middle) {
-  NodeWaves waves = waves_of(setup, {.patch = 0.0}, 2);
+  NodeWaves waves = waves_of(setup, {.tile = 0.0}, 2);
   const auto value = [&](double height) {
     const BumpedNodes nodes(height, middle);
     return weighted(waves.look(nodes.positions.data(), nodes.normals.data()), weights());
@@ -121,9 +121,9 @@ TEST(NodeWaves, AdjointIsTheDerivative) {
   for (const OpticalSetup& setup : {small_setup(), lamp, white}) {
     for (const Eigen::Vector2d& middle : {Eigen::Vector2d(1.3, 1.7), Eigen::Vector2d(0.3, 2.5)}) {
       const double difference = by_difference(setup, middle);
-      EXPECT_NEAR(by_adjoint(setup, {.patch = 0.0}, middle), difference,
+      EXPECT_NEAR(by_adjoint(setup, {.tile = 0.0}, middle), difference,
                   0.01 * std::abs(difference));
-      EXPECT_NEAR(by_adjoint(setup, {.patch = 5.0}, middle), difference,
+      EXPECT_NEAR(by_adjoint(setup, {.tile = 6.0, .overlap = 5.0}, middle), difference,
                   0.05 * std::abs(difference));
     }
   }
@@ -145,7 +145,7 @@ TEST(NodeWaves, ThreadsDoNotChangeABit) {
   const BumpedNodes nodes(kBump);
   std::vector<std::vector<double>> results;
   for (const int threads : {1, 2}) {
-    NodeWaves waves = waves_of(small_setup(), {.patch = 5.0}, threads);
+    NodeWaves waves = waves_of(small_setup(), {.tile = 5.0, .overlap = 3.0}, threads);
     results.push_back(waves.look(nodes.positions.data(), nodes.normals.data()));
     std::vector<double> bar(nodes.positions.size());
     waves.look_adjoint(weights(), bar.data());
@@ -185,7 +185,7 @@ class WaveObjectiveOf : public ::testing::Test {
     options_.samples = kMeshSamples;
     options_.weights.smooth = 0.0;
     options_.surface_height = 5.0;
-    options_.waves = WaveOptions{.patch = 0.0};
+    options_.waves = WaveOptions{.tile = 0.0};
   }
 
   /// Error of the gradient by the control points' heights, against central differences.

@@ -225,46 +225,6 @@ std::vector<double> rays(const OpticalSetup& setup) {
   return flux_of_surface(samples.mesh, samples.normals, setup, Executor::cpu(2));
 }
 
-/// The picture by patches.
-std::vector<double> smooth(const OpticalSetup& setup, const SurfaceField& surface,
-                           const WaveOptions& options, int threads = 2) {
-  return smooth_wave_flux(setup, lens_grid(setup.lens_size, 0.02), surface, options,
-                          Executor::cpu(threads), {});
-}
-
-TEST(WavePicture, PatchesHaveThePictureOfOnePiece) {
-  const OpticalSetup setup = setup_of(9.6, 48);
-  const std::vector<double> one = smooth(setup, bumps(), {.patch = 0.0});
-  EXPECT_LT(difference(one, waves(setup, bumps(), in_one_piece())), 2e-4);
-  EXPECT_LT(difference(smooth(setup, bumps(), {}), one), 2e-4);
-  EXPECT_LT(difference(smooth(setup, bumps(), {.patch = 8.0}), one), 4e-4);
-}
-
-/// Every patch has its own distance.
-TEST(WavePicture, OfATurnedWallNeedsNoOnePlane) {
-  OpticalSetup setup = setup_of(9.6, 48);
-  setup.screen_x = {std::cos(0.3), 0.0, -std::sin(0.3)};
-  EXPECT_LT(
-      difference(smooth(setup, bumps(), {.patch = 8.0}), smooth(setup, bumps(), {.patch = 4.0})),
-      4e-4);
-}
-
-/// Each wavelength's rays go where its index sends them; a mirror's to the lamp's side.
-TEST(WavePicture, PatchesFollowEveryLight) {
-  OpticalSetup white = setup_of(9.6, 48);
-  white.spectrum.wavelengths = {450.0, 650.0};
-  white.spectrum.powers = {1.0, 1.0};
-  OpticalSetup point = setup_of(9.6, 48);
-  point.lamp = PointSource{{4.8, 4.8, -300.0}};
-  point.image_size = {14.0, 14.0};
-  point.image_origin = {-2.2, -2.2};
-  OpticalSetup wide = setup_of(9.6, 48);
-  wide.extent = SourceExtent{0.004, {}};
-  for (const OpticalSetup& setup : {white, point, wide}) {
-    EXPECT_LT(difference(smooth(setup, bumps(), {}), waves(setup, bumps(), in_one_piece())), 3e-4);
-  }
-}
-
 /// What differs is mostly at the rim, within √(λ f) of it.
 TEST(WavePicture, NearsThatOfRaysAsTheWavelengthFalls) {
   const OpticalSetup setup = setup_of(3.2, 16);
@@ -309,7 +269,6 @@ TEST(WavePicture, SameBitsForAnyNumberOfThreads) {
   WaveOptions tiles;
   tiles.tile = 8.0;
   EXPECT_EQ(waves(setup, bumps(), tiles, 0.08, 1), waves(setup, bumps(), tiles, 0.08, 3));
-  EXPECT_EQ(smooth(setup, bumps(), {.patch = 8.0}, 1), smooth(setup, bumps(), {.patch = 8.0}, 3));
 }
 
 }  // namespace
