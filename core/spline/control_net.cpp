@@ -110,8 +110,9 @@ double search(const ControlNet& net, const Eigen::Vector2d& xy, Eigen::Vector2d&
 Eigen::Vector2d parameters_beside(const ControlNet& net, const Eigen::Vector2d& xy) {
   Eigen::Index nearest = 0;
   (net.points.topRows<2>().colwise() - xy).colwise().squaredNorm().minCoeff(&nearest);
-  const Eigen::Vector2d at(static_cast<double>(nearest % net.shape.columns),
-                           static_cast<double>(nearest / net.shape.columns));
+  const Eigen::Index row = nearest / net.shape.columns;
+  const Eigen::Index column = nearest - row * net.shape.columns;
+  const Eigen::Vector2d at(static_cast<double>(column), static_cast<double>(row));
   // A control point is about one knot before its number.
   return (at.array() - 1.0).matrix().cwiseMax(0.0).cwiseMin(net.cells().cast<double>());
 }
