@@ -65,7 +65,7 @@ ObjectiveEvaluation WaveObjective::evaluate(const double* points, double* gradie
   const double share = 1.0 / static_cast<double>(parts_.size());
   for (SplinePart<Executor>& part : parts_) {
     add_picture(points, part, share, result, gradient);
-    if (!result.feasible) break;
+    if (!result.feasible) return {};
   }
   return result;
 }
