@@ -7,6 +7,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <cstdint>
 #include <mutex>
 #include <numbers>
 #include <utility>
@@ -169,6 +170,30 @@ class LaidTriangle {
   double doubled_ = 0.0;  ///< Twice the area; < 0 if it is turned over.
 };
 
+/// What PlaneField::cover() knows of a node: whether a triangle holds it, and points of its cell
+/// that are lit, those on two sheets twice.
+constexpr std::uint8_t kCentre = 0x80;
+constexpr std::uint8_t kPoints = 0x7f;
+
+/// Calls `take(column, row, node)` for the nodes whose cells a triangle may meet.
+template <class Take>
+void for_each_cell(const FieldPlan& plan, const LaidTriangle& triangle, const Take& take) {
+  if (triangle.is_empty()) return;
+  const Eigen::Vector2d last(plan.columns - 1, plan.rows - 1);
+  const Eigen::Vector2d low = (triangle.box().min().array() + 0.5).floor().max(0.0);
+  const Eigen::Vector2d high =
+      (triangle.box().max().array() + 0.5).floor().min(last.array()).max(-1.0);
+  const auto from = low.cwiseMin(last + Eigen::Vector2d::Ones()).cast<int>().eval();
+  const auto to = high.cast<int>().eval();
+  for (int j = from.y(); j <= to.y(); ++j) {
+    for (int i = from.x(); i <= to.x(); ++i) {
+      take(i, j,
+           static_cast<std::size_t>(j) * static_cast<std::size_t>(plan.columns) +
+               static_cast<std::size_t>(i));
+    }
+  }
+}
+
 }  // namespace
 
 int transform_size(double least) {
@@ -185,29 +210,36 @@ PlaneField::PlaneField(const FieldPlan& plan)
     : plan_(plan),
       values_(static_cast<std::size_t>(plan.columns) * static_cast<std::size_t>(plan.rows)) {}
 
+void PlaneField::cover(const std::array<Vertex, 3>& vertices) {
+  lit_.resize(values_.size());
+  const LaidTriangle triangle(plan_, vertices);
+  for_each_cell(plan_, triangle, [&](int i, int j, std::size_t node) {
+    const int points = (lit_[node] & kPoints) + triangle.points_inside(plan_.points, i, j);
+    const bool centre = (lit_[node] & kCentre) != 0 || triangle.contains(i, j);
+    lit_[node] = static_cast<std::uint8_t>(std::min(points, int{kPoints}) | (centre ? kCentre : 0));
+  });
+}
+
+/// A triangle's field goes on beyond its sides as a quadratic. Where a surface has detail finer
+/// than a cell that is wrong by some percent, so only cells without another have it.
 template <class Take>
 void PlaneField::for_each_node(const std::array<Vertex, 3>& vertices, const Take& take) const {
   const LaidTriangle triangle(plan_, vertices);
-  if (triangle.is_empty()) return;
-  // The nodes whose cells the triangle meets.
-  const Eigen::Vector2d last(plan_.columns - 1, plan_.rows - 1);
-  const Eigen::Vector2d low = (triangle.box().min().array() + 0.5).floor().max(0.0);
-  const Eigen::Vector2d high =
-      (triangle.box().max().array() + 0.5).floor().min(last.array()).max(-1.0);
-  const double weight = 1.0 / plan_.points.prod();
-  const auto from = low.cwiseMin(last + Eigen::Vector2d::Ones()).cast<int>().eval();
-  const auto to = high.cast<int>().eval();
-  for (int j = from.y(); j <= to.y(); ++j) {
-    for (int i = from.x(); i <= to.x(); ++i) {
-      const int inside = triangle.points_inside(plan_.points, i, j);
-      if (inside == 0) continue;
-      LaidTriangle::Field field = triangle.field(i, j);
-      field.amplitude *= weight * inside;
-      take(static_cast<std::size_t>(j) * static_cast<std::size_t>(plan_.columns) +
-               static_cast<std::size_t>(i),
-           field);
+  const double all = plan_.points.prod();
+  for_each_cell(plan_, triangle, [&](int i, int j, std::size_t node) {
+    double share = 0.0;
+    if (lit_.empty()) {
+      share = triangle.contains(i, j) ? 1.0 : 0.0;
+    } else if ((lit_[node] & kCentre) == 0) {
+      share = triangle.points_inside(plan_.points, i, j) / all;
+    } else if (triangle.contains(i, j)) {
+      share = std::min((lit_[node] & kPoints) / all, 1.0);
     }
-  }
+    if (share == 0.0) return;
+    LaidTriangle::Field field = triangle.field(i, j);
+    field.amplitude *= share;
+    take(node, field);
+  });
 }
 
 void PlaneField::add(const std::array<Vertex, 3>& vertices) {

@@ -95,6 +95,9 @@ class WaveTile {
   /// The tile's field on the screen.
   [[nodiscard]] PlaneField on_screen() const {
     PlaneField field(plan_.field);
+    if (field.plan().points.prod() > 1) {
+      for_each_laid([&](const auto& vertices, const auto& /*indices*/) { field.cover(vertices); });
+    }
     for_each_laid([&](const auto& vertices, const auto& /*indices*/) { field.add(vertices); });
     field.propagate();
     return field;

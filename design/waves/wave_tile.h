@@ -96,11 +96,14 @@ class PlaneField {
 
   explicit PlaneField(const FieldPlan& plan);
 
-  /// Adds the field of a triangle of neighbouring rays at the nodes of which a point is inside it,
-  /// at the latest when the field is propagated or lay_rest() is called.
-  /// The path is the quadratic through the vertices with their directions as slopes; a triangle
-  /// that is turned over is beyond a fold, where the phase is π/2 less. Points on a common side of
-  /// two triangles belong to one of them.
+  /// Of a field with a hard edge, all triangles, before the first of add(): cells at the edge have
+  /// as much of their node's field as is lit of them.
+  void cover(const std::array<Vertex, 3>& vertices);
+  /// Adds the field of a triangle of neighbouring rays at the nodes inside it, or, of nodes that no
+  /// triangle holds, of which a point is; at the latest when the field is propagated or lay_rest()
+  /// is called. The path is the quadratic through the vertices with their directions as slopes; a
+  /// triangle that is turned over is beyond a fold, where the phase is π/2 less. Points on a common
+  /// side of two triangles belong to one of them.
   void add(const std::array<Vertex, 3>& vertices);
   void lay_rest();
 
@@ -126,7 +129,7 @@ class PlaneField {
 
   [[nodiscard]] const FieldPlan& plan() const { return plan_; }
   [[nodiscard]] double bytes() const {
-    return static_cast<double>(values_.size() * sizeof(values_[0]));
+    return static_cast<double>(values_.size() * sizeof(values_[0]) + lit_.size());
   }
   /// Node (i, j), (0, 0) the lowest.
   [[nodiscard]] const std::complex<float>& at(int i, int j) const {
@@ -164,6 +167,7 @@ class PlaneField {
 
   FieldPlan plan_;
   std::vector<std::complex<float>> values_;
+  std::vector<std::uint8_t> lit_;  ///< Of a field with a hard edge: by cover().
   Pending pending_;
 };
 
