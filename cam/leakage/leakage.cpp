@@ -308,9 +308,7 @@ WaveLeakage measure_waves(const LeakageChain& chain, const Image& target,
   LF_CHECK(chain.waves.rays != nullptr, chain.designed.name);
   require_pixels(target, setup.optics);
   const double wavelength = chain.waves.wavelength;
-  WaveOptions waves;
-  waves.wavelength = wavelength;
-  waves.scatter = chain.waves.scatter;
+  const WaveOptions waves = chain.waves.options().value();
   const ChainPictures pictures = pictures_by_waves(chain, setup, waves, executor, control);
   const FluxPicture& designed = pictures.at(chain.designed.field);
   const PictureJudge judge(target, designed, options);
@@ -550,7 +548,8 @@ class PlaceStudy {
 
  private:
   [[nodiscard]] FluxPicture render(const NamedSurface& surface, const CellRange& cells) const {
-    return render_cells(*surface.field, setup_, cells, executor_, RunControl());
+    return light_of_cells(*surface.field, setup_, cells, chain_.waves.options(), executor_,
+                          RunControl());
   }
 
   /// Sets the square's place, and the middle and height of its worst cell.
@@ -656,6 +655,10 @@ std::vector<LeakPlace> worst_places(const LeakMap& map, const LeakageChain& chai
   for (const CellRange& square : worst_squares(map, options)) {
     places.push_back(study.study(map, square));
   }
+  // The map is of rays: waves may see another order, and no leak.
+  std::erase_if(places, [](const LeakPlace& place) { return place.leakage <= 0.0; });
+  std::stable_sort(places.begin(), places.end(),
+                   [](const LeakPlace& a, const LeakPlace& b) { return a.leakage > b.leakage; });
   return places;
 }
 

@@ -112,9 +112,18 @@ struct RenderedSurface;
 
 /// What a chain's pictures by waves need besides its setup.
 struct ChainWaves {
-  double wavelength = 0.0;                ///< mm; of a setup without a spectrum.
+  double wavelength = 0.0;                ///< mm; of a setup without a spectrum; 0: by rays.
   double scatter = 0.0;                   ///< WaveOptions::scatter
   const RenderedSurface* rays = nullptr;  ///< The designed surface by rays.
+
+  /// Nothing if the light goes as rays.
+  [[nodiscard]] std::optional<WaveOptions> options() const {
+    if (wavelength == 0.0) return std::nullopt;
+    WaveOptions waves;
+    waves.wavelength = wavelength;
+    waves.scatter = scatter;
+    return waves;
+  }
 };
 
 /// Surfaces from the designed one to the part; each adds one cause of wrong light to the one
@@ -125,7 +134,7 @@ struct LeakageChain {
   std::vector<NamedSurface> others;  ///< Only rendered and compared.
   TileObserver observe = {};         ///< Sees the tiles of those without a grid of their own.
   const Haze* haze = nullptr;        ///< Of the part's picture: the last cause, if there is any.
-  ChainWaves waves = {};             ///< Of measure_waves() alone.
+  ChainWaves waves = {};             ///< Of measure_waves() and worst_places().
 
   [[nodiscard]] const NamedSurface& part() const { return steps.back(); }
 };
@@ -304,8 +313,8 @@ struct LeakPlace {
 };
 
 /// The places that leak most, worst first, at least a square's side apart. `map` gives the places,
-/// the chain the causes, haze not among them: it scatters light of every place alike. @throw
-/// Interrupted as the executor does.
+/// the chain the causes, by waves if it has them, haze not among them: it scatters light of every
+/// place alike. @throw Interrupted as the executor does.
 std::vector<LeakPlace> worst_places(const LeakMap& map, const LeakageChain& chain,
                                     const LeakageResult& result, const FieldRenderSetup& setup,
                                     const LeakPlaceOptions& options, const Executor& executor);

@@ -2,6 +2,7 @@
 #include "cam/leakage/render_field.h"
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 
@@ -86,6 +88,16 @@ FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setu
                          const RunControl& control) {
   const SurfaceField* const one = &field;
   return std::move(render_parts({&one, 1}, setup, cells, executor, control).front());
+}
+
+FluxPicture light_of_cells(const SurfaceField& field, const FieldRenderSetup& setup,
+                           const CellRange& cells, const std::optional<WaveOptions>& waves,
+                           const Executor& executor, const RunControl& control) {
+  if (!waves) return render_cells(field, setup, cells, executor, control);
+  const Eigen::Vector2i& pixels = setup.optics.pixels;
+  return {pixels.x(), pixels.y(),
+          wave_flux_of({cells, setup.whole}, setup.optics, setup.grid, field, *waves, executor,
+                       control)};
 }
 
 }  // namespace lensforge

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -55,5 +56,10 @@ std::vector<FluxPicture> render_fields(std::span<const SurfaceField* const> fiel
 FluxPicture render_cells(const SurfaceField& field, const FieldRenderSetup& setup,
                          const CellRange& cells, const Executor& executor,
                          const RunControl& control);
+
+/// The same, by waves if there are options for them: wave_flux_of().
+FluxPicture light_of_cells(const SurfaceField& field, const FieldRenderSetup& setup,
+                           const CellRange& cells, const std::optional<WaveOptions>& waves,
+                           const Executor& executor, const RunControl& control);
 
 }  // namespace lensforge

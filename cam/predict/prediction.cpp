@@ -32,6 +32,7 @@
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 namespace {
@@ -48,6 +49,10 @@ constexpr double kMicrometres = 1e3;
 /// A cut's first order of diffraction goes to λ / pitch from its rays; with its own width, this
 /// much farther.
 constexpr double kOrderWidth = 1.2;
+
+double order_angle(double wavelength, const Passes& passes) {
+  return kOrderWidth * wavelength / passes.pitch;
+}
 
 /// Blurs of the light, of the polish, which moves the picture's detail like the lens's, and of the
 /// ripple that polish leaves of the rows: twice as far as its steepest slope moves a ray. Of a
@@ -160,21 +165,24 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
   const LightChoice light = light_choice(setup, options.light, cut.is_creased(), wavelength);
   result.light_words = light.words;
   result.blurs = blurs_of(lens.setup, options, passes, setup.surface_height, wavelength);
+  LeakageChain places_chain = chain;
   if (light.waves) {
     LeakageChain by_waves = surfaces.short_chain();
     by_waves.haze = &result.haze;
-    by_waves.waves = {wavelength, kOrderWidth * wavelength / passes.pitch,
-                      &result.leakage.designed};
+    result.light = {wavelength, order_angle(wavelength, passes)};
+    by_waves.waves = {result.light.wavelength, result.light.scatter, &result.leakage.designed};
     result.waves = measure_waves(by_waves, lens.target, setup, options.leakage, executor, control);
+    places_chain = by_waves;
   }
   result.sampling = check_sampling(chain, result.leakage, lens.target, setup, executor, control);
   // Places and remedies are those of the surface. Haze is no place's: with it the map's total would
   // be less than the leakage, and pixels that it alone lights would count light of good places.
+  const LeakageResult& judged = result.judged();
   const std::vector<double> weights =
-      pixels_with_surplus(result.leakage.clear_part().picture, result.leakage.designed.picture);
+      pixels_with_surplus(judged.clear_part().picture, judged.designed.picture);
   const LeakMap map =
       map_leakage(chain.designed, chain.part(), setup, weights, kLeakCell, executor);
-  result.places = worst_places(map, chain, result.leakage, setup, {}, executor);
+  result.places = worst_places(map, places_chain, judged, setup, {}, executor);
   result.creases = creases.map();
   result.height = height_map(map);
   const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
@@ -374,14 +382,17 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const OpticalSetup& optics = site_.setup.lens->setup;
   const GridWindow grid =
       sampled_grid(optics.lens_size, sample_spacings(before, optics, site_.setup.passes()));
-  const CellGrid fine =
-      refined(grid, place.cells,
-              sample_spacings(options_, optics, passes_on_lens(options_, site_.setup.ground())));
+  const Passes passes = passes_on_lens(options_, site_.setup.ground());
+  const CellGrid fine = refined(grid, place.cells, sample_spacings(options_, optics, passes));
   const std::optional<CastFrame> mould = site_.setup.mould();
   const PolishModel& polish = options_.workshop.polish;
   const double polished =
       polish_reach(polish) * polish.sigma + (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
-  const double beyond = (mould ? mould->scale : 1.0) * polished + passes_.front().tool.diameter;
+  std::optional<WaveOptions> waves = site_.waves.options();
+  if (waves) waves->scatter = std::max(waves->scatter, order_angle(waves->wavelength, passes));
+  const double height = site_.setup.lens->surface.vertices.row(2).mean();
+  const double seen = polished + (waves ? 0.5 * ramp_width(optics, height, *waves) : 0.0);
+  const double beyond = (mould ? mould->scale : 1.0) * seen + passes_.front().tool.diameter;
   const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
   const Eigen::AlignedBox2d box =
       grown_within(as_written(in_mould(box_of(grid, place.cells), mould), stretch), beyond,
@@ -392,12 +403,11 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const SurfaceField& raw = cast ? static_cast<const SurfaceField&>(*cast) : milled;
   const PolishedField part(raw, {Eigen::Vector2d(0.0, 0.0), optics.lens_size},
                            options_.workshop.polish);
-  FieldRenderSetup setup{.optics = optics,
-                         .grid = grid,
-                         .surface_height = site_.setup.lens->surface.vertices.row(2).mean()};
-  const FluxPicture predicted = render_cells(site_.part, setup, place.cells, executor_, silent);
+  FieldRenderSetup setup{.optics = optics, .grid = grid, .surface_height = height};
+  const FluxPicture predicted =
+      light_of_cells(site_.part, setup, place.cells, waves, executor_, silent);
   setup.grid = fine.grid;
-  const FluxPicture now = render_cells(part, setup, fine.cells, executor_, silent);
+  const FluxPicture now = light_of_cells(part, setup, fine.cells, waves, executor_, silent);
   const Exchange change = exchange(site_.leakage, predicted, now);
   LeakTrial trial;
   trial.leakage = place.leakage + change.leakage;
@@ -469,7 +479,9 @@ Change with_half_the_polish_and_pitch(const CamOptions& options, double pitch) {
 std::vector<Change> changes_against(const std::string& cause, const CutSetup& setup) {
   const CamOptions& options = setup.options;
   if (cause == leak_cause::kScallop) return {with_half_the_pitch(options, setup.pitch())};
-  if (cause == leak_cause::kChord) return {with_half_the_tolerances(options)};
+  if (cause == leak_cause::kChord || cause == leak_cause::kPath) {
+    return {with_half_the_tolerances(options)};
+  }
   if (cause == leak_cause::kPolish) {
     return {with_half_the_polish(options), with_half_the_polish_and_pitch(options, setup.pitch())};
   }
@@ -603,8 +615,8 @@ Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const Cut
   const PartSurfaces& surfaces = cut.surfaces();
   Prediction prediction = predict_part(surfaces, setup, executor, control);
   if (options.remedies) {
-    try_remedies({setup, passes, surfaces.part(), prediction.leakage}, prediction.places, executor,
-                 control);
+    try_remedies({setup, passes, surfaces.part(), prediction.judged(), prediction.light},
+                 prediction.places, executor, control);
   }
   if (options.tolerances > 0) {
     prediction.tolerances = draw_parts(setup, surfaces, prediction, executor, control);

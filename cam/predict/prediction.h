@@ -32,6 +32,7 @@ namespace lensforge {
 struct Prediction {
   LeakageResult leakage;             ///< By rays.
   std::optional<WaveLeakage> waves;  ///< Where the light model asks for them.
+  ChainWaves light = {};             ///< Of `waves`.
   std::string light_words;           ///< By what the part is judged, and why.
   std::vector<PictureBlur> blurs;    ///< Of light and part.
   Haze haze;                         ///< Of the part; none where its roughness is not stated.
@@ -62,8 +63,9 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
 struct TrialSite {
   const CutSetup& setup;
   const CutPasses& passes;
-  const SurfaceField& part;  ///< As predicted.
-  const LeakageResult& leakage;
+  const SurfaceField& part;      ///< As predicted.
+  const LeakageResult& leakage;  ///< By rays or waves.
+  ChainWaves waves = {};         ///< Of the light, if it goes as waves.
 };
 
 /// Cuts places of a predicted cut again, with other options: the finishing rows and valleys around

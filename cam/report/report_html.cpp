@@ -165,11 +165,9 @@ std::string places(const ReportData& data) {
   for (const LeakPlace& place : data.places) {
     items += element("li", "", escape_html(leak_words(place)));
   }
-  return element(
-      "div", "",
-      element("h3", "",
-              joined({"Worst places on the ", data.lit_part(), data.waves ? ", by rays" : ""})) +
-          element("ol", "class=\"places\"", items));
+  return element("div", "",
+                 element("h3", "", "Worst places on the " + data.lit_part()) +
+                     element("ol", "class=\"places\"", items));
 }
 
 std::string work(const ReportData& data) {

@@ -77,6 +77,7 @@ struct PointPicture {
   /// Factor of this light in the picture.
   [[nodiscard]] double scale(const WaveColor& color) const {
     // What a lens takes in depends on its surface, but for light along z.
+    if (color.whole > 0.0) return color.share / color.whole;
     const bool all = color.light.intake_is_plan_area() || whole == 0.0;
     return color.share / (all ? 1.0 : whole);
   }
@@ -265,14 +266,13 @@ void add_tiles(const std::vector<Tile>& tiles, const WaveScene& scene, PointLigh
 
 }  // namespace
 
-std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const GridWindow& grid,
-                                           std::span<const SurfaceField* const> surfaces,
-                                           const WaveOptions& options, const Executor& executor,
-                                           const RunControl& control) {
-  const double height = middle_height(grid, *surfaces.front());
-  const SourceKernel kernel = source_kernel(setup, height);
-  const WaveScene scene = scene_of(setup, kernel, options, control);
-  const std::vector<Tile> tiles = wave_tiles(scene, setup, height, all_cells(grid), grid.spacing);
+namespace {
+
+/// Pictures of surfaces that are sampled tile by tile.
+std::vector<std::vector<double>> pictures_of(const WaveScene& scene, const SourceKernel& kernel,
+                                             const std::vector<Tile>& tiles, const GridWindow& grid,
+                                             std::span<const SurfaceField* const> surfaces,
+                                             const Executor& executor) {
   PointLightOf light(scene, surfaces.size());
   std::vector<SurfaceNodes> sampled;
   const auto sample = [&](std::span<const Tile> batch) {
@@ -280,7 +280,7 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
     SurfacePatch patch;
     for (const Tile& tile : batch) {
       for (const SurfaceField* const surface : surfaces) {
-        if (control.stop_requested()) throw Interrupted();
+        if (scene.control.stop_requested()) throw Interrupted();
         surface->sample(window_of(grid, tile.cells(), 0), executor, patch);
         sampled.push_back(nodes_of(patch));
       }
@@ -292,7 +292,8 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
   };
   const auto none = [](std::size_t /*tile*/) { return nullptr; };
   add_tiles(tiles, scene, light, executor, sample, none);
-  SourceBlurOn<Executor> blur(kernel, setup.pixels.x(), setup.pixels.y(), executor);
+  const Eigen::Vector2i pixels = scene.colors.front().setup.pixels / kernel.parts;
+  SourceBlurOn<Executor> blur(kernel, pixels.x(), pixels.y(), executor);
   std::vector<std::vector<double>> pictures;
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
     const std::vector<double> parts = light.of(s);
@@ -300,6 +301,58 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
     pictures.emplace_back(flux.begin(), flux.end());
   }
   return pictures;
+}
+
+/// A stretch of an axis of `all` cells, with ramps of a width but at the ends of the axis.
+Stretch stretch_of(std::int64_t begin, std::int64_t count, std::int64_t all, double ramp) {
+  const std::int64_t end = begin + count;
+  // A ramp neither leaves the axis nor meets the other.
+  const auto width = [&](std::int64_t room) {
+    return std::min({static_cast<std::int64_t>(std::llround(ramp)), 2 * room, count});
+  };
+  Stretch one{begin, end, width(begin), width(all - end)};
+  one.begin -= one.rise / 2;
+  one.end += one.fall - one.fall / 2;
+  return one;
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const GridWindow& grid,
+                                           std::span<const SurfaceField* const> surfaces,
+                                           const WaveOptions& options, const Executor& executor,
+                                           const RunControl& control) {
+  const double height = middle_height(grid, *surfaces.front());
+  const SourceKernel kernel = source_kernel(setup, height);
+  const WaveScene scene = scene_of(setup, kernel, options, control);
+  const std::vector<Tile> tiles = wave_tiles(scene, setup, height, all_cells(grid), grid.spacing);
+  return pictures_of(scene, kernel, tiles, grid, surfaces, executor);
+}
+
+std::vector<double> wave_flux_of(const WavePart& part, const OpticalSetup& setup,
+                                 const GridWindow& grid, const SurfaceField& surface,
+                                 const WaveOptions& options, const Executor& executor,
+                                 const RunControl& control) {
+  const double height = middle_height(grid, surface);
+  const SourceKernel kernel = source_kernel(setup, height);
+  WaveScene scene = scene_of(setup, kernel, options, control);
+  for (std::size_t c = 0; c < scene.colors.size(); ++c) {
+    WaveColor& color = scene.colors[c];
+    if (!part.whole.empty()) color.light = color.light.sharing(part.whole[c]);
+    color.whole = 1.0;
+  }
+  const CellRange& cells = part.cells;
+  const CellRange all = all_cells(grid);
+  const double ramp = ramp_width(setup, height, options);
+  const Tile tile{stretch_of(cells.column, cells.columns, all.columns, ramp / grid.spacing.x()),
+                  stretch_of(cells.row, cells.rows, all.rows, ramp / grid.spacing.y())};
+  const SurfaceField* const one = &surface;
+  return std::move(pictures_of(scene, kernel, {tile}, grid, {&one, 1}, executor).front());
+}
+
+double ramp_width(const OpticalSetup& setup, double height, const WaveOptions& options) {
+  const double longest = wave_colors(setup, options.wavelength).back().wavelength;
+  return options.overlap * coherence_length(setup, height, longest);
 }
 
 /// What of a surface's waves stays while it changes, and what its last picture left.

@@ -277,8 +277,9 @@ struct WaveColor {
   LightPath light;
   LampPath path;
   Screen screen;
-  double wavelength;  ///< mm
-  double share;       ///< Of the brightness.
+  double wavelength;   ///< mm
+  double share;        ///< Of the brightness.
+  double whole = 0.0;  ///< Light of the whole lens, by light.flux(); 0: what the tiles add up to.
 };
 
 /// Common inputs of the tiles.

@@ -71,7 +71,7 @@ class Predicted {
   }
 
   [[nodiscard]] TrialSite site() const {
-    return {setup_, passes_, surfaces().part(), prediction_.leakage};
+    return {setup_, passes_, surfaces().part(), prediction_.judged(), prediction_.light};
   }
   [[nodiscard]] const Executor& executor() const { return executor_; }
   [[nodiscard]] const PartSurfaces& surfaces() const { return cut_->surfaces(); }
@@ -143,6 +143,65 @@ TEST(TrialCut, OfAPartOfTheLensLeaksAsThatPartDoes) {
   place.leakage = leaks;
   const LeakTrial trial = TrialCut(cut.site(), options, cut.executor()).at(place, {});
   EXPECT_NEAR(trial.leakage, leaks, 0.01 * leaks);
+}
+
+/// A lens whose picture diffraction blurs, of a size that one place covers.
+Lens wavy_lens() {
+  Lens lens;
+  lens.setup.lens_size = {3.2, 3.2};
+  lens.setup.image_size = {6.4, 6.4};
+  lens.setup.image_origin = {-1.6, -1.6};
+  lens.setup.pixels = {32, 32};
+  lens.setup.focal_length = 80.0;
+  lens.surface = testing::grid_mesh(65, 65, 3.2, 3.2, [](double x, double y) {
+    return 5.0 + 5e-4 * std::sin(2.0 * x) * std::cos(1.5 * y);
+  });
+  lens.target = Image(32, 32, 0.0F);
+  for (int r = 8; r < 24; ++r) {
+    for (int c = 8; c < 24; ++c) lens.target.at(c, r) = 1.0F;
+  }
+  return lens;
+}
+
+CamOptions smooth_by_waves() {
+  CamOptions options = facets_polished();
+  options.surface = SurfaceModel::kSmooth;
+  options.light = LightModel::kWaves;
+  options.workshop.process.finish.pitch = 0.08;
+  options.workshop.polish.sigma = 0.03;
+  options.workshop.process.finish.slope_tolerance = 1e-5;  // Of a trial, chords lie elsewhere.
+  return options;
+}
+
+TEST(TrialCut, ByWavesWithNothingChangedLeaksWhatWasPredicted) {
+  const CamOptions options = smooth_by_waves();
+  const Predicted cut(wavy_lens(), options);
+  ASSERT_EQ(cut.prediction().places.size(), 1U);
+  const LeakPlace& place = cut.prediction().places[0];
+  EXPECT_NEAR(place.leakage, cut.prediction().judged().part().quality.leakage,
+              0.01 * place.leakage);
+  EXPECT_EQ(main_cause(place), leak_cause::kScallop);
+  const LeakTrial trial = TrialCut(cut.site(), options, cut.executor()).at(place, {});
+  EXPECT_NEAR(trial.leakage, place.leakage, 0.01 * place.leakage);
+}
+
+/// What a trial says of a closer pitch is what a whole cut with it comes to, by waves.
+TEST(TrialCut, ByWavesLeaksAsAWholeCutDoes) {
+  const Predicted cut(wavy_lens(), smooth_by_waves());
+  ASSERT_EQ(cut.prediction().places.size(), 1U);
+  CamOptions finer = smooth_by_waves();
+  finer.workshop.process.finish.pitch = 0.06;
+  const double trial =
+      TrialCut(cut.site(), finer, cut.executor()).at(cut.prediction().places[0], {}).leakage;
+  const double whole = Predicted(wavy_lens(), finer).prediction().judged().part().quality.leakage;
+  const double leak = cut.prediction().places[0].leakage;
+  EXPECT_LT(trial, 0.1 * leak);
+  // A ray's slope does not fall with the pitch as a wave's order does.
+  CamOptions by_rays = finer;
+  by_rays.light = LightModel::kRays;
+  EXPECT_GT(Predicted(wavy_lens(), by_rays).prediction().judged().part().quality.leakage,
+            10.0 * trial);
+  EXPECT_NEAR(trial, whole, 0.02 * leak);
 }
 
 /// What a trial says of a smaller ball is what a whole cut with it comes to.

@@ -13,6 +13,7 @@
 #include "cam/analytic_fields.h"
 #include "core/image/transfer.h"
 #include "core/lens/surface_field.h"
+#include "core/optics/light_path.h"
 #include "design/render.h"
 
 namespace lensforge {
@@ -209,6 +210,33 @@ TEST(WavePicture, TilesHaveThePictureOfOnePiece) {
   const std::vector<double> whole = waves(setup, bumps(), finest);
   EXPECT_LT(difference(waves(setup, bumps(), {}), whole), 2e-4);
   EXPECT_NEAR(sum_of(whole), 1.0, 0.02);
+}
+
+/// A place of a lens is a rectangle: what rectangles side by side send is what the lens does.
+TEST(WavePicture, PartsSideBySideAddUpToTheWhole) {
+  const GridWindow grid = lens_grid({6.4, 6.4}, 0.02);
+  const auto surface = bumps();
+  OpticalSetup near = setup_of(6.4, 32);
+  near.lamp = PointSource{{3.2, 3.2, -400.0}};
+  near.image_size *= 1.2;
+  near.image_origin.setConstant(-0.64);
+  for (const OpticalSetup& setup : {setup_of(6.4, 32), near}) {
+    const LightPath light(setup);
+    // Of the flat surface, which the bumps change by their slopes alone.
+    const double whole =
+        light.intake({{0.0, 0.0, kHeight}, {6.4, 0.0, kHeight}, {6.4, 6.4, kHeight}}) +
+        light.intake({{0.0, 0.0, kHeight}, {6.4, 6.4, kHeight}, {0.0, 6.4, kHeight}});
+    std::vector<double> sum(32 * 32, 0.0);
+    for (const CellRange& cells : {CellRange{0, 0, 150, 200}, CellRange{150, 0, 170, 200},
+                                   CellRange{0, 200, 150, 120}, CellRange{150, 200, 170, 120}}) {
+      const std::vector<double> one =
+          wave_flux_of({cells, {&whole, 1}}, setup, grid, surface, {}, Executor::cpu(2), {});
+      EXPECT_NEAR(sum_of(one), static_cast<double>(cells.columns * cells.rows) / (320 * 320), 0.02);
+      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += one[i];
+    }
+    // Parts of 3 mm, 15 coherence lengths: smaller than tiles.
+    EXPECT_LT(difference(sum, waves(setup, surface, {})), 5e-4);
+  }
 }
 
 /// The picture of rays from the same surface.
