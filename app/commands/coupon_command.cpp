@@ -23,7 +23,8 @@ void describe(Description& d, CouponSettings& settings) {
       .needed = true;
   d.text("--fit", settings.fit, "FILE.toml",
          "fit the workshop to these readings of a coupon instead of making one: polish.sigma, "
-         "polish.order, polish.floor, the finishing ball's diameter and finish.pitch_error");
+         "polish.order, polish.floor, polish.roughness, polish.correlation, the finishing ball's "
+         "diameter and finish.pitch_error");
   d.text("--workshop", settings.workshop, "FILE.toml",
          "the workshop that cuts the coupon; the fitted one differs from it in these values "
          "only");
@@ -55,9 +56,7 @@ nlohmann::json value_json(const FittedValue& value) {
 
 nlohmann::json values_json(const CouponFit& fit) {
   nlohmann::json json;
-  for (const FittedValue* value : {&fit.sigma, &fit.floor, &fit.diameter, &fit.pitch_error}) {
-    json[value->key] = value_json(*value);
-  }
+  for (const FittedValue* value : fit.values()) json[value->key] = value_json(*value);
   json[fit.order.key] = {{"value", static_cast<int>(fit.order.value)},
                          {"determined", fit.order.determined}};
   if (fit.order.determined) json[fit.order.key]["standard_errors"] = fit.order_apart;
@@ -83,8 +82,11 @@ std::string order_text(const CouponFit& fit) {
 
 /// The workshop's values that readings determine.
 std::string values_text(const CouponFit& fit) {
-  return value_text(fit.sigma) + order_text(fit) + value_text(fit.floor) +
-         value_text(fit.diameter) + value_text(fit.pitch_error);
+  std::string text;
+  for (const FittedValue* value : fit.values()) {
+    text += value == &fit.order ? order_text(fit) : value_text(*value);
+  }
+  return text;
 }
 
 std::string reading_text(const FittedReading& reading) {

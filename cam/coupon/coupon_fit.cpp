@@ -150,7 +150,8 @@ constexpr double kMicrometre = 1e-3;  ///< mm
 
 // Plausible ranges of readings, as shares of the expected value. Marks: the largest pitch error of
 // a workshop and a reading's own. Widths and heights: a ball of half or twice its size; a wrong
-// unit is off by a thousand. After polishing any small value is plausible.
+// unit is off by a thousand. After polishing any small value is plausible, and any light is:
+// parse_readings() knows the most haze that there can be.
 constexpr double kMarkShare = 0.03;
 constexpr double kFactor = 3.0;
 constexpr double kAnyFactor = std::numeric_limits<double>::max();
@@ -159,6 +160,7 @@ constexpr double kAnyFactor = std::numeric_limits<double>::max();
 std::string key_of(const char* array, std::size_t index, const char* key) {
   std::string entry = std::string(array) + "[" + std::to_string(index) + "]." + key;
   if (entry.starts_with("mark")) return entry;
+  if (entry.starts_with("haze")) return entry += std::string(" (") + kFlatName + ")";
   return entry += " (" + feature_name(entry.starts_with("groove") ? 'G' : 'P', index) + ")";
 }
 
@@ -197,6 +199,12 @@ std::vector<ModelledReading> modelled_readings(const CouponReadings& readings) {
     add(pad.after, {key_of("pad", i, "after_um"), kMicrometre, {}, after, 0.0, kFactor, true});
     add(pad.orders, {key_of("pad", i, "order_ratio"), 1.0, {}, orders, 0.0, kAnyFactor});
   }
+  for (std::size_t i = 0; i < readings.haze.size(); ++i) {
+    const auto haze = [place = readings.haze[i].place, light = readings.light](const State& s) {
+      return s.haze_ratio(place, light);
+    };
+    add(readings.haze[i].ratio, {key_of("haze", i, "light_ratio"), 1.0, {}, haze, 0.0, kAnyFactor});
+  }
   return all;
 }
 
@@ -207,6 +215,7 @@ void require_plausible(const std::vector<ModelledReading>& readings, const Coupo
   CouponState unpolished = expected;
   unpolished.sigma = 0.0;
   for (const ModelledReading& one : readings) {
+    if (one.most == kAnyFactor) continue;
     const double usual = one.predicted(one.polished ? unpolished : expected) / one.unit;
     const double value = one.reading.value / one.unit;
     if (value >= one.least * usual && value <= one.most * usual) continue;
@@ -218,7 +227,7 @@ void require_plausible(const std::vector<ModelledReading>& readings, const Coupo
   }
 }
 
-enum Parameter { kSigma, kRadius, kPitchError, kOffset, kFloor };
+enum Parameter { kSigma, kRadius, kPitchError, kOffset, kFloor, kRoughness, kCorrelation };
 
 // Range of σ for the search: outside it no ripple is changed, or none is left.
 constexpr double kMinSigma = 0.002;  ///< mm
@@ -227,22 +236,36 @@ constexpr double kNoSigma = 1e-6;    ///< mm; in place of 0, which has no logari
 constexpr int kSigmas = 161;         ///< In equal ratios of 1.03.
 constexpr std::size_t kStarts = 4;   ///< Number of them followed to their minimum.
 
-using Parameters = Eigen::Vector<double, 5>;
+constexpr double kNoRoughness = 1e-3;  ///< nm; in place of 0, too.
+
+using Parameters = Eigen::Vector<double, 7>;
 
 CouponState state_of(const Eigen::VectorXd& p, int order) {
-  return {std::exp(p[kSigma]), std::exp(p[kRadius]), p[kPitchError], p[kOffset], p[kFloor], order};
+  return {std::exp(p[kSigma]),
+          std::exp(p[kRadius]),
+          p[kPitchError],
+          p[kOffset],
+          p[kFloor],
+          order,
+          {std::exp(p[kRoughness]), std::exp(p[kCorrelation])}};
 }
 
 Eigen::VectorXd parameters_of(const CouponState& state) {
-  return Parameters(std::log(std::max(state.sigma, kNoSigma)), std::log(state.radius),
-                    state.pitch_error, state.groove_offset, state.floor);
+  return Parameters{{std::log(std::max(state.sigma, kNoSigma)), std::log(state.radius),
+                     state.pitch_error, state.groove_offset, state.floor,
+                     std::log(std::max(state.roughness.rms, kNoRoughness)),
+                     std::log(state.roughness.correlation)}};
+}
+
+bool contains(const std::vector<int>& free, int parameter) {
+  return std::find(free.begin(), free.end(), parameter) != free.end();
 }
 
 /// Deviations of readings from a state, in their uncertainties.
 LeastSquares problem_of(const std::vector<ModelledReading>& readings, int order) {
   LeastSquares problem;
-  problem.steps = Parameters(1e-4, 1e-5, 1e-6, 1e-6, 1e-5);
-  problem.longest = Parameters(0.5, 0.2, 0.01, 0.02, 0.05);
+  problem.steps = Parameters{{1e-4, 1e-5, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5}};
+  problem.longest = Parameters{{0.5, 0.2, 0.01, 0.02, 0.05, 0.5, 0.2}};
   problem.residuals = [&readings, order](const Eigen::VectorXd& p) {
     const CouponState state = state_of(p, order);
     Eigen::VectorXd residuals(static_cast<Eigen::Index>(readings.size()));
@@ -258,9 +281,7 @@ LeastSquares problem_of(const std::vector<ModelledReading>& readings, int order)
 
 /// Values of σ where the readings agree better than at its neighbours.
 std::vector<Eigen::VectorXd> starts(const LeastSquares& problem, const Eigen::VectorXd& begin) {
-  if (std::find(problem.free.begin(), problem.free.end(), kSigma) == problem.free.end()) {
-    return {begin};
-  }
+  if (!contains(problem.free, kSigma)) return {begin};
   std::vector<Eigen::VectorXd> places(kSigmas, begin);
   std::vector<double> sums;
   for (int k = 0; k < kSigmas; ++k) {
@@ -280,6 +301,34 @@ std::vector<Eigen::VectorXd> starts(const LeastSquares& problem, const Eigen::Ve
   std::vector<Eigen::VectorXd> chosen{begin};
   for (const auto& [sum, k] : lowest) chosen.push_back(places[k]);
   return chosen;
+}
+
+// Correlation lengths for the search: the light's width goes with 1/ℓ, and from one that is 1.5
+// times too long or too short the steps find their way.
+constexpr double kMinCorrelation = 0.3;    ///< µm; shorter than a wave of light.
+constexpr double kMaxCorrelation = 100.0;  ///< µm; the light stays in the beam.
+constexpr double kCorrelationRatio = 1.5;
+constexpr double kRoughnessStart = 10.0;  ///< nm
+
+/// The values of the workshop, but for a roughness that is fitted: where the haze agrees best of
+/// several correlation lengths, each with its own σ_r.
+Eigen::VectorXd begin_of(const LeastSquares& problem, const CouponState& own) {
+  Eigen::VectorXd best = parameters_of(own);
+  if (contains(problem.free, kRoughness)) best[kRoughness] = std::log(kRoughnessStart);
+  if (!contains(problem.free, kCorrelation)) return best;
+  LeastSquares alone = problem;
+  alone.free = {kRoughness};
+  double least = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd start = best;
+  for (double length = kMinCorrelation; length < kMaxCorrelation; length *= kCorrelationRatio) {
+    start[kCorrelation] = std::log(length);
+    const Eigen::VectorXd end = minimize(alone, start);
+    const double sum = problem.residuals(end).squaredNorm();
+    if (sum >= least) continue;
+    least = sum;
+    best = end;
+  }
+  return best;
 }
 
 Eigen::VectorXd best_fit(const LeastSquares& problem, const Eigen::VectorXd& begin) {
@@ -309,6 +358,10 @@ std::vector<int> touched(const CouponReadings& readings) {
   if (polished || grooves || any(readings.pads, &PadReadings::before)) free.push_back(kRadius);
   if (any(readings.marks, &MarkReadings::distance)) free.push_back(kPitchError);
   if (grooves) free.push_back(kOffset);
+  if (any(readings.haze, &HazeReadings::ratio)) {
+    free.push_back(kRoughness);
+    free.push_back(kCorrelation);
+  }
   return free;
 }
 
@@ -326,7 +379,7 @@ struct Solution {
     if (at == problem.free.end()) return std::nullopt;
     return at - problem.free.begin();
   }
-  void solve(const CouponState& own) { settle(best_fit(problem, parameters_of(own))); }
+  void solve(const CouponState& own) { settle(best_fit(problem, begin_of(problem, own))); }
   void settle(const Eigen::VectorXd& minimum) {
     best = minimum;
     quality = fit_quality(problem, best);
@@ -334,10 +387,13 @@ struct Solution {
   }
 };
 
-/// Parameter to be held, −1 for none. The radius first: its maker states it.
+/// Parameter to be held, −1 for none. The radius first: its maker states it. The roughness last:
+/// its light alone gives it for a known correlation length.
 int unknown_among(const Solution& solution) {
   const std::array limits{std::pair(kRadius, kRadiusShare), std::pair(kSigma, kSigmaShare),
-                          std::pair(kPitchError, kPitchErrorMost)};
+                          std::pair(kPitchError, kPitchErrorMost),
+                          std::pair(kCorrelation, kCorrelationShare),
+                          std::pair(kRoughness, kRoughnessShare)};
   for (const auto& [parameter, most] : limits) {
     const auto place = solution.place(parameter);
     if (place && !(solution.quality.uncertainties[*place] <= most)) return parameter;
@@ -345,16 +401,16 @@ int unknown_among(const Solution& solution) {
   return -1;
 }
 
-/// Adds an error of kRadiusShare of a held ball to the uncertainty of ln σ.
-void take_in_ball(Solution& solution) {
+/// Adds an error `share` of a held value to the uncertainty of a fitted one, both logarithms.
+void take_in(Solution& solution, Parameter held, double share, Parameter fitted) {
   constexpr double kChange = 0.01;
-  const auto sigma = solution.place(kSigma);
-  if (solution.place(kRadius) || !sigma) return;
+  const auto place = solution.place(fitted);
+  if (solution.place(held) || !place) return;
   Eigen::VectorXd other = solution.best;
-  other[kRadius] += kChange;
-  const double change = minimize(solution.problem, other)[kSigma] - solution.best[kSigma];
-  double& known = solution.quality.uncertainties[*sigma];
-  known = std::hypot(known, kRadiusShare / kChange * change);
+  other[held] += kChange;
+  const double change = minimize(solution.problem, other)[fitted] - solution.best[fitted];
+  double& known = solution.quality.uncertainties[*place];
+  known = std::hypot(known, share / kChange * change);
 }
 
 /// @throw InputError naming the reading that deviates most from the others, if by more than
@@ -380,7 +436,7 @@ void require_agreement(const std::vector<ModelledReading>& readings, const FitQu
 /// Rounds to between a hundredth and a thousandth of its uncertainty, for readable files.
 double to_digits(double value, double uncertainty) {
   const double digits = std::pow(10.0, 2.0 - std::floor(std::log10(uncertainty)));
-  return std::round(value * digits) / digits;
+  return std::round(value * digits) / digits + 0.0;  // No negative zero.
 }
 
 /// @param unit  of the value per unit of the parameter.
@@ -405,6 +461,11 @@ CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponSt
       value_of(solution, kRadius, diameter, {"tool.diameter", 2.0 * own.radius}, diameter);
   fit.pitch_error = value_of(solution, kPitchError, 1.0, {"finish.pitch_error", own.pitch_error},
                              state.pitch_error);
+  const Roughness& rough = state.roughness;
+  fit.roughness =
+      value_of(solution, kRoughness, rough.rms, {"polish.roughness", own.roughness.rms}, rough.rms);
+  fit.correlation = value_of(solution, kCorrelation, rough.correlation,
+                             {"polish.correlation", own.roughness.correlation}, rough.correlation);
   fit.touch_off =
       value_of(solution, kOffset, 1.0, {"touch-off (mm)", own.groove_offset}, state.groove_offset);
   const Eigen::VectorXd residuals = solution.problem.residuals(solution.best);
@@ -420,10 +481,18 @@ CouponFit result_of(const std::vector<ModelledReading>& readings, const CouponSt
 
 }  // namespace
 
+std::vector<const FittedValue*> CouponFit::values() const {
+  std::vector<const FittedValue*> all{&sigma, &order, &floor, &diameter, &pitch_error};
+  if (haze) all.insert(all.begin() + 3, {&roughness, &correlation});
+  return all;
+}
+
 Workshop CouponFit::applied_to(Workshop workshop) const {
   if (sigma.determined) workshop.polish.sigma = sigma.value;
   if (sigma.determined) workshop.polish.order = static_cast<int>(order.value);
   if (floor.determined) workshop.polish.floor = floor.value;
+  if (roughness.determined) workshop.polish.roughness = roughness.value;
+  if (correlation.determined) workshop.polish.correlation = correlation.value;
   if (pitch_error.determined) workshop.process.finish.pitch_error = pitch_error.value;
   for (Tool& tool : workshop.tools) {
     if (diameter.determined && tool.number == workshop.process.finish.tool) {
@@ -498,8 +567,10 @@ CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
                       file);
   }
   require_agreement(modelled, solution.quality, file);
-  take_in_ball(solution);
+  take_in(solution, kRadius, kRadiusShare, kSigma);
+  take_in(solution, kCorrelation, kCorrelationShare, kRoughness);
   CouponFit fit = result_of(modelled, own, solution);
+  fit.haze = contains(free, kRoughness);
   fit.order.determined = apart > 0.0;
   fit.order_apart = apart;
   return fit;
@@ -565,18 +636,16 @@ std::optional<std::string> edited_workshop(const std::string& text, const Worksh
     const Workshop from = parse_workshop(text, "workshop");
     const FinishProcess& finish = to.process.finish;
     std::string edited = text;
-    if (from.polish.sigma != to.polish.sigma) {
-      set_number(edited, "polish", "sigma", to.polish.sigma);
-    }
-    if (from.polish.order != to.polish.order) {
-      set_number(edited, "polish", "order", to.polish.order);
-    }
-    if (from.polish.floor != to.polish.floor) {
-      set_number(edited, "polish", "floor", to.polish.floor);
-    }
-    if (from.process.finish.pitch_error != finish.pitch_error) {
-      set_number(edited, "finish", "pitch_error", finish.pitch_error);
-    }
+    const PolishModel& was = from.polish;
+    const auto change = [&](const char* table, const char* key, double before, double after) {
+      if (before != after) set_number(edited, table, key, after);
+    };
+    change("polish", "sigma", was.sigma, to.polish.sigma);
+    change("polish", "order", was.order, to.polish.order);
+    change("polish", "floor", was.floor, to.polish.floor);
+    change("polish", "roughness", was.roughness, to.polish.roughness);
+    change("polish", "correlation", was.correlation, to.polish.correlation);
+    change("finish", "pitch_error", from.process.finish.pitch_error, finish.pitch_error);
     const double diameter = to.tool(finish.tool).diameter;
     if (from.tool(finish.tool).diameter != diameter) set_diameter(edited, finish.tool, diameter);
     if (parse_workshop(edited, "workshop") == to) return edited;
@@ -593,15 +662,9 @@ constexpr std::size_t kLongestName = 200;  ///< Of the readings' file, in a comm
 constexpr std::string_view kFitted = "# Fitted by ";
 constexpr std::string_view kValue = "#   ";
 
-std::array<const FittedValue*, 5> values_of(const CouponFit& fit) {
-  return {&fit.sigma, &fit.order, &fit.floor, &fit.diameter, &fit.pitch_error};
-}
-
 bool determines_any(const CouponFit& fit) {
-  for (const FittedValue* value : values_of(fit)) {
-    if (value->determined) return true;
-  }
-  return false;
+  const std::vector<const FittedValue*> values = fit.values();
+  return std::any_of(values.begin(), values.end(), [](const auto* one) { return one->determined; });
 }
 
 std::string sureness(const CouponFit& fit, const FittedValue& value) {
@@ -613,7 +676,7 @@ std::string sureness(const CouponFit& fit, const FittedValue& value) {
 std::string fitted_text(const CouponFit& fit, const std::string& readings) {
   std::string text =
       "# Fitted by " + program_mark() + " to " + printable_line(readings, kLongestName) + ":\n";
-  for (const FittedValue* value : values_of(fit)) {
+  for (const FittedValue* value : fit.values()) {
     text += std::string(kValue) + value->key +
             (value->determined ? " = " + number_text(value->value) + sureness(fit, *value)
                                : " is not determined, left as it was") +
@@ -640,8 +703,8 @@ CouponFit fit_workshop(const WorkshopFit& task) {
   CouponFit fit = fit_coupon(readings, task.workshop, name);
   if (!determines_any(fit)) {
     throw InputError(name + ": " + std::to_string(readings.count()) +
-                     " readings: determine neither polish.sigma, tool.diameter nor "
-                     "finish.pitch_error; take more of them, or more exact ones");
+                     " readings: determine neither polish.sigma, polish.roughness, tool.diameter "
+                     "nor finish.pitch_error; take more of them, or more exact ones");
   }
   const Workshop fitted = fit.applied_to(task.workshop);
   validate(fitted, name + ", the workshop as fitted");

@@ -65,11 +65,15 @@ struct CouponFit {
   /// By how many standard errors the readings prefer this order to the other: √ of the difference
   /// of both chi squares.
   double order_apart = 0.0;
+  FittedValue roughness, correlation;
+  bool haze = false;      ///< It was read; otherwise these two are not among values().
   FittedValue touch_off;  ///< Excess depth of grooves over the program, mm; not of a workshop.
   std::vector<FittedReading> readings;
   double chi_square = 0.0;  ///< Σ deviation²
   int freedom = 0;          ///< Number of readings minus values fitted, including touch-off.
 
+  /// Values of the workshop that readings of these kinds might determine, in a fixed order.
+  [[nodiscard]] std::vector<const FittedValue*> values() const;
   /// The workshop with the determined ones of polish, finishing ball and pitch error.
   [[nodiscard]] Workshop applied_to(Workshop workshop) const;
 };
@@ -82,19 +86,22 @@ inline constexpr double kFloorMost = 0.05;       ///< Of a ripple; pads leave a 
 inline constexpr double kSigmaShare = 0.25;      ///< Of σ; as good as a guess.
 inline constexpr double kRadiusShare = 0.05;     ///< Of R; makers of small balls keep to 2 to 5 %.
 inline constexpr double kPitchErrorMost = 2e-3;  ///< Of a length; a worse machine shows at once.
+inline constexpr double kRoughnessShare = 0.25;  ///< Of σ_r; twice that of the scattered light.
+inline constexpr double kCorrelationShare = 0.25;  ///< Of ℓ, and so of the haze's width.
 
 /// Maximum deviation of a reading from the others, in standard deviations. Of 20 sound readings,
 /// one set in 800 has one beyond it.
 inline constexpr double kMaxDeviation = 4.0;
 
-/// Weighted least squares over ln σ, ln R, pitch error and touch-off, by Levenberg-Marquardt steps
-/// from several σ, because an order's light is not monotone in its ripple; for both orders of the
-/// polish, and with the floor as the workshop's or free. A floor is taken where it lowers chi
-/// square by kPreference², then the order of the lower chi square; if that is not lower by
-/// kPreference² the workshop's order stays. Uncertainties are those of the readings, propagated
-/// through the linearised model. Values that the readings do not determine (the limits above; the
-/// radius is given up before σ) keep the workshop's value; σ's uncertainty then includes an error
-/// of kRadiusShare of a fixed ball.
+/// Weighted least squares over ln σ, ln R, pitch error and touch-off, and over ln σ_r and ln ℓ of
+/// the roughness where haze was read, by Levenberg-Marquardt steps from several σ, because an
+/// order's light is not monotone in its ripple; for both orders of the polish, and with the floor
+/// as the workshop's or free. A floor is taken where it lowers chi square by kPreference², then the
+/// order of the lower chi square; if that is not lower by kPreference² the workshop's order stays.
+/// Uncertainties are those of the readings, propagated through the linearised model. Values that
+/// the readings do not determine (the limits above; the radius is given up before σ, ℓ before σ_r)
+/// keep the workshop's value; σ's uncertainty then includes an error of kRadiusShare of a fixed
+/// ball, that of σ_r one of kCorrelationShare of a fixed ℓ, each to first order.
 /// @param file   of the readings, for messages.
 /// @param order  of the polish, if it is known.
 /// @throw InputError naming the file and a reading: no readings at all; a value impossible for a
@@ -105,10 +112,10 @@ CouponFit fit_coupon(const CouponReadings& readings, const Workshop& workshop,
 /// Fit of readings that all equal their expected values: it has the same uncertainties.
 CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop);
 
-/// A workshop's file with polish.sigma, the finishing ball's diameter and finish.pitch_error
-/// changed; every other byte, including comments, is unchanged.
+/// A workshop's file with the values of CouponFit::values() changed; every other byte, including
+/// comments, is unchanged.
 /// @param text  TOML that parse_workshop() takes.
-/// @param to    the same workshop with other values of these three.
+/// @param to    the same workshop with other values of these.
 /// @return nothing where the file cannot be edited: it states no tools and the ball changes, or its
 ///         layout is not supported.
 std::optional<std::string> edited_workshop(const std::string& text, const Workshop& to);

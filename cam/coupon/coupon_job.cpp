@@ -99,8 +99,9 @@ ProgramPlan CouponPlan::program(const RunControl& control) {
   plan.operations.push_back(
       {kOperation,
        ball(),
-       {std::to_string(layout_.pads.size()) + " pads, " + std::to_string(layout_.grooves.size()) +
-        " grooves, 2 marks " + trimmed_decimal(layout_.mark_distance(), 3) + " mm apart"},
+       {std::to_string(layout_.pads.size()) + " pads, a flat pad, " +
+        std::to_string(layout_.grooves.size()) + " grooves, 2 marks " +
+        trimmed_decimal(layout_.mark_distance(), 3) + " mm apart"},
        [this, &control](const MoveSink& sink) { return cut(sink, control); }});
   return plan;
 }
@@ -128,6 +129,7 @@ OperationSummary CouponPlan::cut(const MoveSink& sink, const RunControl& control
   for (const CouponPad& pad : layout_.pads) {
     if (!cut_pad(pad, sink, control, summary)) return summary;
   }
+  if (!cut_pad(layout_.flat, sink, control, summary)) return summary;
   cut_groove(layout_.marks[1], sink, summary);
   summary.complete = true;
   return summary;
@@ -367,23 +369,27 @@ class Drawing {
   SvgWriter svg_{2};
 };
 
+void draw_pad(const CouponLayout& layout, const CouponPad& pad, const std::string& name,
+              Drawing& drawing) {
+  const Eigen::Vector2d low = layout.xy(pad.box.min().x(), pad.box.min().y());
+  const Eigen::Vector2d high = layout.xy(pad.box.max().x(), pad.box.max().y());
+  drawing.box(low, high, "fill=\"#b9d3ea\" stroke=\"#0b5cad\"");
+  const std::string pitch = trimmed_decimal(pad.pitch, 3);
+  if (layout.along == 0) {
+    const Eigen::Vector2d middle = 0.5 * (low + high);
+    drawing.words(middle, name, "middle", {0.0, -4.0});
+    drawing.words(middle, pitch, "middle", {0.0, 13.0});
+  } else {
+    drawing.words({high.x(), 0.5 * (low.y() + high.y())}, joined({name, " ", pitch}), "start",
+                  {7.0, 4.5});
+  }
+}
+
 void draw_pads(const CouponLayout& layout, Drawing& drawing) {
   for (std::size_t i = 0; i < layout.pads.size(); ++i) {
-    const Eigen::AlignedBox2d& box = layout.pads[i].box;
-    const Eigen::Vector2d low = layout.xy(box.min().x(), box.min().y());
-    const Eigen::Vector2d high = layout.xy(box.max().x(), box.max().y());
-    drawing.box(low, high, "fill=\"#b9d3ea\" stroke=\"#0b5cad\"");
-    const std::string name = feature_name('P', i);
-    const std::string pitch = trimmed_decimal(layout.pads[i].pitch, 3);
-    if (layout.along == 0) {
-      const Eigen::Vector2d middle = 0.5 * (low + high);
-      drawing.words(middle, name, "middle", {0.0, -4.0});
-      drawing.words(middle, pitch, "middle", {0.0, 13.0});
-    } else {
-      drawing.words({high.x(), 0.5 * (low.y() + high.y())}, joined({name, " ", pitch}), "start",
-                    {7.0, 4.5});
-    }
+    draw_pad(layout, layout.pads[i], feature_name('P', i), drawing);
   }
+  draw_pad(layout, layout.flat, kFlatName, drawing);
 }
 
 void draw_grooves(const CouponLayout& layout, Drawing& drawing) {
@@ -491,6 +497,13 @@ std::string after_table(const CouponSheet& sheet) {
          "light of a first spot over that of the middle one: laser pointer and light meter",
          number_text(pad.orders->value, 2), code("order_ratio"), ""});
   }
+  for (const HazeReadings& haze : sheet.expected.haze) {
+    rows.push_back({kFlatName, "pitch " + mm(sheet.layout.flat.pitch),
+                    "light " + number_text(haze.place.angle, 3) +
+                        "° from the beam over that of the beam: laser pointer and photodiode",
+                    haze.ratio ? number_text(haze.ratio->value, 2) : "not known",
+                    code("light_ratio"), ""});
+  }
   return html_table(kColumns, rows);
 }
 
@@ -505,6 +518,12 @@ std::string known(const CouponFit& fit) {
       words("the ball's diameter", fit.diameter, rough_um(fit.diameter.uncertainty));
   const std::string pitch = words("the pitch error", fit.pitch_error,
                                   number_text(100.0 * fit.pitch_error.uncertainty, 2) + " %");
+  const std::string roughness = fit.haze
+                                    ? words(", the polish's roughness", fit.roughness,
+                                            number_text(fit.roughness.uncertainty, 2) + " nm") +
+                                          words(", its correlation length", fit.correlation,
+                                                number_text(fit.correlation.uncertainty, 2) + " µm")
+                                    : std::string();
   const std::string order = fit.order.determined
                                 ? "; it tells the order of the polish by " +
                                       number_text(fit.order_apart, 2) + " standard errors"
@@ -513,7 +532,7 @@ std::string known(const CouponFit& fit) {
       "p", "",
       escape_html("With every reading of this sheet, and the uncertainties that the file "
                   "states, the fit tells " +
-                  sigma + ", " + ball + " and " + pitch + order + "."));
+                  sigma + roughness + ", " + ball + " and " + pitch + order + "."));
 }
 
 /// Distance of the first spot from the middle one on the first pad, a metre behind it.
@@ -549,7 +568,9 @@ std::string coupon_sheet(const CouponSheet& sheet) {
       std::string("Passes run along ") + (layout.along == 0 ? "X" : "Y") +
       ". Pads, with their pitches: " + mm(layout.pads.front().box.sizes().x()) +
       " along the passes, " + mm(layout.pads.front().box.sizes().y()) + " across, " +
-      mm(layout.pad_depth) + " deep.";
+      mm(layout.pad_depth) + " deep. The flat pad " + kFlatName + ": " +
+      mm(layout.flat.box.sizes().x()) + " along, " + mm(layout.flat.box.sizes().y()) +
+      " across, as deep.";
   const std::array<std::pair<std::string_view, std::string>, 14> values{{
       {"PROGRAM", program_mark()},
       {"STYLE", std::string(coupon_page::kStyle)},

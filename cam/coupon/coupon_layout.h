@@ -44,6 +44,9 @@ struct CouponPad {
   double pitch = 0.0;
 };
 
+/// Name of the flat pad.
+inline constexpr const char* kFlatName = "F";
+
 /// Layout of a coupon; mm from the blank's corner, which is X0 Y0. "Along" is the axis of the
 /// workshop's finishing passes, "across" the other.
 ///
@@ -52,6 +55,9 @@ struct CouponPad {
 ///   of the touch-off error.
 /// - Pads: the scallops' heights p²/(8R) before polishing also give the radius; the ripples after
 ///   polishing, smaller by the transfer function at 2π/p, give σ, order and floor.
+/// - A flat pad, whose passes are so close that the polish leaves nothing of their ripples: light
+///   that it scatters gives roughness and correlation length. A polish with a floor leaves that
+///   share of its scallops; they diffract across the passes, and haze is measured along them.
 struct CouponLayout {
   int along = 0;        ///< Axis of the passes: 0 for x, 1 for y.
   double radius = 0.0;  ///< Of the ball, from the workshop.
@@ -59,6 +65,7 @@ struct CouponLayout {
   std::vector<CouponGroove> marks;  ///< Two.
   std::vector<CouponGroove> grooves;
   std::vector<CouponPad> pads;
+  CouponPad flat;
   Eigen::Vector2d size = Eigen::Vector2d::Zero();  ///< Of the blank, (along, across).
 
   /// Distance of the marks as programmed.
@@ -75,7 +82,7 @@ struct CouponLayout {
 std::string feature_name(char letter, std::size_t index);
 
 /// Pitches and depths suit the workshop's ball and polish: pitches are 2.5 to 6 σ, but at most
-/// 1.2 R, depths 0.15 to 0.8 R, but at most 0.2 mm.
+/// 1.2 R, that of the flat pad is σ, but at most 0.2 R, depths 0.15 to 0.8 R, but at most 0.2 mm.
 /// @pre the options are within their limits.
 /// @throw InputError naming option or key, value and rule, where the marks are too close for the
 ///        features between them, pads are not deeper than their scallops, or flutes are too short.

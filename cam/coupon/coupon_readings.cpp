@@ -84,11 +84,18 @@ double PolishedScallop::order_ratio(double phase) const {
   return std::norm(first) / std::norm(zeroth);
 }
 
+double HazePlace::sine() const { return std::sin(std::numbers::pi / 180.0 * angle); }
+double HazePlace::cosine() const { return std::cos(std::numbers::pi / 180.0 * angle); }
+
 CouponState CouponState::of(const Workshop& workshop) {
   const FinishProcess& finish = workshop.process.finish;
-  return {workshop.polish.sigma, workshop.tool(finish.tool).radius(),
-          finish.pitch_error,    0.0,
-          workshop.polish.floor, workshop.polish.order};
+  return {workshop.polish.sigma,
+          workshop.tool(finish.tool).radius(),
+          finish.pitch_error,
+          0.0,
+          workshop.polish.floor,
+          workshop.polish.order,
+          {workshop.polish.roughness, workshop.polish.correlation}};
 }
 
 double CouponState::mark_distance(double programmed) const {
@@ -112,24 +119,44 @@ double CouponState::order_ratio(double pitch, const CouponLight& light) const {
   return ripples.order_ratio(light.phase());
 }
 
+double CouponState::haze_ratio(const HazePlace& place, const CouponLight& light) const {
+  const double share = scattered_share(roughness, light.ior - 1.0, light.wavelength);
+  const double deviation = scattered_deviation(roughness, light.wavelength);
+  const double off = place.sine() / deviation;
+  const double density =
+      std::exp(-0.5 * off * off) / (2.0 * std::numbers::pi * deviation * deviation);
+  return share / (1.0 - share) * density * place.cosine() * place.solid_angle;
+}
+
 namespace {
 
 constexpr double kMicrometre = 1e-3;  ///< mm
 constexpr double kNanometre = 1e-6;   ///< mm
 
 // Uncertainties that the template states: calliper's points in grooves, measuring microscope,
-// roughness tester (ISO 12179 calibrates to some per cent), light meter of a phone.
+// roughness tester (ISO 12179 calibrates to some per cent), light meter of a phone or photodiode.
 constexpr double kMarkUncertainty = 0.03;    ///< mm
 constexpr double kWidthUncertainty = 0.003;  ///< mm
 constexpr double kHeightShare = 0.05;
 constexpr double kHeightUncertainty = 5e-5;  ///< mm
-constexpr double kOrderShare = 0.15;
+constexpr double kLightShare = 0.15;
 constexpr double kFaintestRipple = 2.0 * kHeightUncertainty;  ///< mm, worth a tester's reading.
 
 constexpr double kFaintest = 0.002;  ///< Minimum ratio of light for a phone's meter.
 /// Maximum amplitude of the light's delay for which the ratio rises with the ripples, rad: J₁/J₀
 /// has its first pole at 2.4.
 constexpr double kMaxDelay = 1.5;
+
+// Haze that the template asks for. The angles lie where the light depends on both roughness and
+// correlation length, but beside the beam.
+constexpr std::array kHazeAngles{1.0, 1.5, 2.0, 2.5};  ///< In deviations of the scattered light.
+constexpr double kNarrowestHaze = 0.01;  ///< Deviation; 5 mm beside the beam half a metre behind.
+constexpr double kWidestHaze = 0.3;      ///< The last angle is then 49°.
+constexpr double kDetector = 2.8e-5;  ///< sr; a hole of 3 mm, which lets a beam through, at 0.5 m.
+constexpr double kFaintestHaze = 1e-7;  ///< Of the beam: of a milliwatt 0.1 nW, for a photodiode.
+
+constexpr double kMostAngle = 60.0;      ///< Degrees
+constexpr double kMostSolidAngle = 0.1;  ///< sr; a wider detector does not read one angle.
 
 constexpr std::size_t kMaxEntries = 100;  ///< Of one kind: ten coupons.
 
@@ -147,6 +174,7 @@ const ReadingKeys kWidth{"width_mm", "width_uncertainty_mm", 1.0, 1e-3, 10.0};
 const ReadingKeys kBefore{"before_um", "before_uncertainty_um", kMicrometre, 1e-3, 1000.0};
 const ReadingKeys kAfter{"after_um", "after_uncertainty_um", kMicrometre, 1e-3, 1000.0};
 const ReadingKeys kOrders{"order_ratio", "order_ratio_uncertainty", 1.0, 1e-6, 1e3};
+const ReadingKeys kHaze{"light_ratio", "light_ratio_uncertainty", 1.0, 1e-12, 1.0};
 
 constexpr double kFinestUncertainty = 1e-6;  ///< Of the least value; no instrument is better.
 
@@ -168,6 +196,10 @@ class Template {
              number_text(expected->value / keys.unit, 3) + "\n";
     number(keys.uncertainty, rounded(expected->uncertainty / keys.unit));
   }
+  /// A reading of which nothing is expected.
+  void open(const ReadingKeys& keys) {
+    text_ += "# " + keys.value + " =\n# " + keys.uncertainty + " =\n";
+  }
   [[nodiscard]] const std::string& result() const { return text_; }
 
  private:
@@ -181,6 +213,13 @@ constexpr const char* kHead =
     "two\n"
     "# readings in three are closer to the truth. Put in what your tools can do.\n"
     "# Then: lensforge coupon --fit THIS FILE --workshop WORKSHOP.toml --out FITTED.toml\n";
+
+constexpr const char* kHazeHead =
+    "\n# F, the flat pad, polished: light at an angle from the beam over that of the beam, both\n"
+    "# with the same small detector, behind the blank. Go aside along the passes. solid_angle_sr "
+    "is\n"
+    "# the detector's area over the square of its distance. Subtract what the untouched blank\n"
+    "# beside the pad scatters.\n";
 
 std::optional<Reading> read(TomlFields& fields, const ReadingKeys& keys) {
   const Limits limits{kFinestUncertainty * keys.least, keys.most};
@@ -203,6 +242,25 @@ GrooveReadings read_groove(TomlFields& fields) {
 PadReadings read_pad(TomlFields& fields) {
   return {fields.number("pitch_mm", {1e-4, 10.0}), read(fields, kBefore), read(fields, kAfter),
           read(fields, kOrders)};
+}
+
+/// Light that a place gets at most, over the beam's, if no more is scattered than left in the beam:
+/// D(s) is 1 / (e π s²) for the correlation length that throws most of it there.
+double most_haze(const HazePlace& place) {
+  const double s = place.sine();
+  return place.cosine() * place.solid_angle / (std::numbers::e * std::numbers::pi * s * s);
+}
+
+HazeReadings read_haze(TomlFields& fields) {
+  const HazeReadings haze{{fields.number("angle_deg", Limits::above(0.0, kMostAngle)),
+                           fields.number("solid_angle_sr", Limits::above(0.0, kMostSolidAngle))},
+                          read(fields, kHaze)};
+  if (haze.ratio && haze.ratio->value > most_haze(haze.place)) {
+    fields.refuse(kHaze.value, "must be at most " + number_text(most_haze(haze.place), 3) +
+                                   " at this angle for this solid_angle_sr: a polish that scatters "
+                                   "half of the light throws no more there");
+  }
+  return haze;
 }
 
 template <class Entry, class Read>
@@ -240,8 +298,22 @@ PadReadings expected_pad(double pitch, const CouponState& state, const CouponLig
   if (ripples > kFaintestRipple) pad.after = height_reading(ripples);
   const double ratio = state.order_ratio(pitch, light);
   const double delay = 0.5 * light.phase() * ripples;
-  if (ratio > kFaintest && delay < kMaxDelay) pad.orders = Reading{ratio, kOrderShare * ratio};
+  if (ratio > kFaintest && delay < kMaxDelay) pad.orders = Reading{ratio, kLightShare * ratio};
   return pad;
+}
+
+std::vector<HazeReadings> expected_haze(const CouponState& state, const CouponLight& light) {
+  const double deviation = std::clamp(scattered_deviation(state.roughness, light.wavelength),
+                                      kNarrowestHaze, kWidestHaze);
+  std::vector<HazeReadings> all;
+  for (const double share : kHazeAngles) {
+    const double angle = 180.0 / std::numbers::pi * std::asin(share * deviation);
+    const HazePlace place{rounded(angle), kDetector};
+    const double ratio = state.haze_ratio(place, light);
+    all.push_back({place, {}});
+    if (ratio > kFaintestHaze) all.back().ratio = Reading{ratio, kLightShare * ratio};
+  }
+  return all;
 }
 
 }  // namespace
@@ -253,6 +325,7 @@ int CouponReadings::count() const {
   for (const PadReadings& pad : pads) {
     sum += (pad.before ? 1 : 0) + (pad.after ? 1 : 0) + (pad.orders ? 1 : 0);
   }
+  for (const HazeReadings& one : haze) sum += one.ratio ? 1 : 0;
   return sum;
 }
 
@@ -270,6 +343,7 @@ CouponReadings expected_readings(const CouponLayout& layout, const Workshop& wor
   for (const CouponPad& pad : layout.pads) {
     readings.pads.push_back(expected_pad(pad.pitch, state, readings.light));
   }
+  readings.haze = expected_haze(state, readings.light);
   return readings;
 }
 
@@ -302,6 +376,17 @@ std::string readings_template(const CouponReadings& expected) {
     file.reading(kAfter, expected.pads[i].after);
     file.reading(kOrders, expected.pads[i].orders);
   }
+  if (!expected.haze.empty()) file.text(kHazeHead);
+  for (std::size_t i = 0; i < expected.haze.size(); ++i) {
+    file.text(i == 0 ? "[[haze]]\n" : "\n[[haze]]\n");
+    file.number("angle_deg", expected.haze[i].place.angle);
+    file.number("solid_angle_sr", expected.haze[i].place.solid_angle);
+    if (expected.haze[i].ratio) {
+      file.reading(kHaze, expected.haze[i].ratio);
+    } else {
+      file.open(kHaze);
+    }
+  }
   return file.result();
 }
 
@@ -312,6 +397,7 @@ CouponReadings parse_readings(std::string_view text, const std::string& file) {
   readings.marks = entries<MarkReadings>(fields, "mark", read_mark);
   readings.grooves = entries<GrooveReadings>(fields, "groove", read_groove);
   readings.pads = entries<PadReadings>(fields, "pad", read_pad);
+  readings.haze = entries<HazeReadings>(fields, "haze", read_haze);
   fields.finish();
   return readings;
 }

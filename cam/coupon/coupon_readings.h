@@ -15,7 +15,7 @@
 
 namespace lensforge {
 
-/// Light for measuring a coupon's orders of diffraction through the blank.
+/// Light for measuring a coupon's orders of diffraction and its haze through the blank.
 struct CouponLight {
   double wavelength = 532e-6;  ///< In air, mm.
   double ior = 1.49;           ///< Of the blank.
@@ -58,6 +58,15 @@ class PolishedScallop {
   std::size_t count_ = 0;                   ///< Number of leading waves that are not zero.
 };
 
+/// Where light beside the beam is measured: behind the blank, in air.
+struct HazePlace {
+  double angle = 0.0;        ///< From the beam, degrees, above 0.
+  double solid_angle = 0.0;  ///< Of the detector, its area over the square of its distance, sr.
+
+  [[nodiscard]] double sine() const;
+  [[nodiscard]] double cosine() const;
+};
+
 /// Parameters of a coupon's measurements; mm.
 struct CouponState {
   double sigma = 0.0;          ///< Of the polish.
@@ -66,6 +75,7 @@ struct CouponState {
   double groove_offset = 0.0;  ///< Excess depth of grooves over the program: the touch-off.
   double floor = 0.0;          ///< Of the polish; share of a ripple.
   int order = kPadOrder;       ///< Of the polish.
+  Roughness roughness;         ///< That the polish leaves.
 
   /// Values of the workshop's file.
   static CouponState of(const Workshop& workshop);
@@ -76,6 +86,14 @@ struct CouponState {
   [[nodiscard]] double scallop_before(double pitch) const;
   [[nodiscard]] double scallop_after(double pitch) const;
   [[nodiscard]] double order_ratio(double pitch, const CouponLight& light) const;
+
+  /// Light that a small detector takes beside the beam, over the light of the beam:
+  /// S / (1 − S) · D(sin θ) cos θ Ω, where D is the scattered light's density by direction cosines,
+  /// the Gaussian of scattered_deviation(), and cos θ Ω the detector's extent in them (Haze).
+  /// Summed over the hemisphere it is S / (1 − S), and light of random phase screens agrees (test
+  /// CouponModel.ARandomScreen…). A round detector half as wide as that deviation reads it within
+  /// 3.5 % out to 2.5 deviations (test CouponModel.AWideDetector…).
+  [[nodiscard]] double haze_ratio(const HazePlace& place, const CouponLight& light) const;
 };
 
 /// A measured value with its standard uncertainty (one σ), > 0; both in the same unit.
@@ -100,12 +118,18 @@ struct PadReadings {
   std::optional<Reading> orders;  ///< Light of a first order over the zeroth, polished.
 };
 
+struct HazeReadings {
+  HazePlace place;
+  std::optional<Reading> ratio;  ///< Light there over that of the beam, on the flat pad, polished.
+};
+
 /// All readings of one or several coupons.
 struct CouponReadings {
   std::vector<MarkReadings> marks;
   std::vector<GrooveReadings> grooves;
   std::vector<PadReadings> pads;
   CouponLight light;
+  std::vector<HazeReadings> haze;
 
   [[nodiscard]] int count() const;
 };
@@ -113,16 +137,17 @@ struct CouponReadings {
 /// Readings expected if the workshop is as its file states, with uncertainties of common tools:
 /// calliper in grooves 0.03 mm, measuring microscope 3 µm, roughness tester 5 % but at least 0.05
 /// µm, light meter 15 %. Ripples and light too faint for these tools are left out, as is light that
-/// does not rise with the ripples.
+/// does not rise with the ripples. Haze has its places, but values only where the workshop states a
+/// roughness that a photodiode sees.
 CouponReadings expected_readings(const CouponLayout& layout, const Workshop& workshop);
 
-/// Readings as a commented TOML file to be filled in; comments state the expected values.
+/// Readings as a commented TOML file to be filled in; comments state the expected values, if any.
 std::string readings_template(const CouponReadings& expected);
 
 /// Reads a filled-in template. Entries without a reading count as not measured.
 /// @param file  its name in messages.
 /// @throw InputError naming file, key, value and rule: values that are no numbers or out of range,
-///        readings without an uncertainty, unknown keys.
+///        readings without an uncertainty, haze of more than half of the light, unknown keys.
 CouponReadings parse_readings(std::string_view text, const std::string& file);
 
 }  // namespace lensforge

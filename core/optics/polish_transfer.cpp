@@ -171,16 +171,22 @@ Haze Haze::times(double factor) const {
   return other;
 }
 
+double scattered_share(const Roughness& roughness, double path, double wavelength) {
+  const double phase = 2.0 * kPi * kMmPerNm * roughness.rms * path / wavelength;
+  return -std::expm1(-phase * phase);
+}
+
+double scattered_deviation(const Roughness& roughness, double wavelength) {
+  return wavelength / (std::numbers::sqrt2 * kPi * kMmPerMicrometre * roughness.correlation);
+}
+
 Haze haze_of(const Roughness& roughness, const OpticalSetup& setup, double z, double wavelength) {
   Haze haze{.roughness = roughness};
   if (roughness.none()) return haze;
   const OpticalSetup lit = setup.spectrum.none() ? setup : in_color(setup, wavelength / kMmPerNm);
   const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), z);
-  const double phase =
-      2.0 * kPi * kMmPerNm * roughness.rms * path_per_height(lit, middle) / wavelength;
-  haze.share = -std::expm1(-phase * phase);
-  const double spread =
-      wavelength / (std::numbers::sqrt2 * kPi * kMmPerMicrometre * roughness.correlation);
+  haze.share = scattered_share(roughness, path_per_height(lit, middle), wavelength);
+  const double spread = scattered_deviation(roughness, wavelength);
   const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
   haze.deviation = LightPath(lit).clearance(middle) * spread * pixel.cwiseInverse();
   return haze;

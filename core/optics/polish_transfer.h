@@ -108,6 +108,14 @@ struct Haze {
   [[nodiscard]] Haze times(double factor) const;
 };
 
+/// Share of the light that a roughness scatters beside its rays, S above.
+/// @param path  Change of the optical path per height: n − 1 for a lens. @param wavelength  mm.
+double scattered_share(const Roughness& roughness, double path, double wavelength);
+
+/// Standard deviation per axis of the scattered light's direction cosines, λ / (√2 π ℓ).
+/// @param wavelength  mm.
+double scattered_deviation(const Roughness& roughness, double wavelength);
+
 /// Haze of a surface of this height, from its middle to the screen's, with distances on a turned
 /// screen to first order.
 /// @param z  mm. @param wavelength  mm, in air.

@@ -116,6 +116,25 @@ TEST_F(Coupon, BadReadingsAreRefusedAndNothingIsWritten) {
   expect_refusal(make(), 2, {"measured.toml: holds readings", "--force"});
 }
 
+/// Light that a polish of 12 nm over 6 µm scatters at the angles that the template asks for.
+TEST_F(Coupon, HazeGivesThePolishItsRoughness) {
+  ASSERT_EQ(make().exit_code, 0);
+  for (const char* ratio : {"2.556e-05", "1.002e-05", "3.333e-06", "6.527e-07"}) {
+    take("light_ratio", 0, ratio);
+    take("light_ratio_uncertainty", 0, "1e-07");
+  }
+  const Outcome fitted = fit({"--json"});
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  const nlohmann::json values = fitted.json()["fit"];
+  EXPECT_NEAR(values["polish.roughness"]["value"], 12.0, 0.05);
+  EXPECT_NEAR(values["polish.correlation"]["value"], 6.0, 0.02);
+  EXPECT_FALSE(values["polish.sigma"]["determined"]);
+  EXPECT_THAT(content(at("fitted.toml")), HasSubstr("roughness = 1"));
+  ASSERT_EQ(make({"--force"}).exit_code, 0);
+  take("light_ratio", 0, "1.5");
+  expect_refusal(fit(), 2, {"measured.toml: haze[0].light_ratio: 1.5: must be in 1e-12 to 1"});
+}
+
 TEST_F(Coupon, OptionsThatDoNotFitAreRefused) {
   expect_refusal(run({"coupon"}), 2, {"--out"});
   expect_refusal(run({"coupon", "--out", path("c"), "--length", "8mm"}), 2,

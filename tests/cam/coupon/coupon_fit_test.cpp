@@ -3,6 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+
 #include "cam/coupon/coupon_layout.h"
 #include "cam/coupon/coupon_readings.h"
 #include "core/error.h"
@@ -15,6 +19,29 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::message_of;
 using ::testing::Not;
+
+/// A workshop that states its roughness.
+Workshop rough_workshop(double rms, double correlation) {
+  Workshop shop;
+  shop.polish.roughness = rms;
+  shop.polish.correlation = correlation;
+  return shop;
+}
+
+/// Haze alone, exact for a polish, where the template of a workshop of 10 nm over 5 µm asks for it.
+CouponReadings haze_readings(double rms, double correlation) {
+  const CouponReadings asked =
+      expected_readings(coupon_layout(CouponOptions{}), rough_workshop(10.0, 5.0));
+  CouponReadings readings;
+  readings.light = asked.light;
+  const CouponState state = CouponState::of(rough_workshop(rms, correlation));
+  for (HazeReadings haze : asked.haze) {
+    const double ratio = state.haze_ratio(haze.place, readings.light);
+    haze.ratio = Reading{ratio, 0.1 * ratio};
+    readings.haze.push_back(haze);
+  }
+  return readings;
+}
 
 /// All readings of the default coupon, exact for the default workshop.
 CouponReadings sound_readings() {
@@ -200,6 +227,97 @@ TEST(CouponFit, AReadingOfAnotherUnitIsRefused) {
   readings = only_marks();
   readings.marks[0].distance->value = 4.0;
   EXPECT_THAT(refusal(readings), HasSubstr("mark[0].distance_mm: 4"));
+}
+
+TEST(CouponFit, HazeAloneTellsRoughnessAndCorrelation) {
+  for (const double rms : {2.0, 12.0, 40.0}) {
+    for (const double correlation : {3.0, 5.0, 7.0, 9.0}) {
+      const CouponFit result = fit(haze_readings(rms, correlation));
+      EXPECT_TRUE(result.haze);
+      ASSERT_TRUE(result.roughness.determined) << rms << ' ' << correlation;
+      EXPECT_NEAR(result.roughness.value, rms, 1e-4 * rms);
+      EXPECT_FALSE(result.sigma.determined);
+      EXPECT_FALSE(result.diameter.determined);
+      ASSERT_TRUE(result.correlation.determined) << rms << ' ' << correlation;
+      EXPECT_NEAR(result.correlation.value, correlation, 1e-4 * correlation);
+      const Workshop fitted = result.applied_to({});
+      EXPECT_EQ(fitted, rough_workshop(result.roughness.value, result.correlation.value));
+    }
+  }
+}
+
+/// Four readings r of 10 % each, where ln r = 2 ln σ_r + 2 ln ℓ − (π ℓ s / λ)² + a constant.
+TEST(CouponFit, UncertaintiesOfHazeAreThoseOfALine) {
+  const CouponReadings readings = haze_readings(5.0, 5.0);
+  const CouponFit result = fit(readings);
+  Eigen::MatrixXd lines(4, 2);
+  for (int i = 0; i < 4; ++i) {
+    const double s = readings.haze[static_cast<std::size_t>(i)].place.sine();
+    const double wave = std::numbers::pi * 5e-3 * s / readings.light.wavelength;
+    lines.row(i) << 2.0, 2.0 - 2.0 * wave * wave;
+  }
+  const Eigen::MatrixXd inverse = (lines.transpose() * lines).inverse();
+  const double rms = 5.0 * 0.1 * std::sqrt(inverse(0, 0));
+  const double correlation = 5.0 * 0.1 * std::sqrt(inverse(1, 1));
+  EXPECT_NEAR(result.roughness.uncertainty, rms, 2e-3 * rms);
+  EXPECT_NEAR(result.correlation.uncertainty, correlation, 1e-4 * correlation);
+}
+
+/// One angle does not tell how wide the haze is: the roughness is fitted for the workshop's own
+/// width, and an error of a quarter of that is in its uncertainty.
+TEST(CouponFit, OneAngleTellsTheRoughnessForTheWorkshopsCorrelation) {
+  CouponReadings readings = haze_readings(12.0, 5.0);
+  readings.haze.resize(1);
+  const CouponFit result = fit(readings);
+  ASSERT_TRUE(result.roughness.determined);
+  EXPECT_NEAR(result.roughness.value, 12.0, 1e-3);
+  EXPECT_FALSE(result.correlation.determined);
+  EXPECT_EQ(result.correlation.value, 5.0);
+  const double s = readings.haze[0].place.sine();
+  const double wave = std::numbers::pi * 5e-3 * s / readings.light.wavelength;
+  const double held = 0.25 * (1.0 - wave * wave);  // d ln σ_r / d ln ℓ is x − 1.
+  EXPECT_NEAR(result.roughness.uncertainty, 12.0 * std::hypot(0.05, held), 0.02);
+  // The same angle twice tells no more.
+  readings.haze.push_back(readings.haze[0]);
+  EXPECT_FALSE(fit(readings).correlation.determined);
+}
+
+TEST(CouponFit, HazeThatIsTooUncertainIsNotDetermined) {
+  CouponReadings readings = haze_readings(12.0, 5.0);
+  for (HazeReadings& haze : readings.haze) haze.ratio->uncertainty *= 30.0;
+  const CouponFit result = fit(readings);
+  EXPECT_TRUE(result.haze);
+  EXPECT_FALSE(result.roughness.determined);
+  EXPECT_FALSE(result.correlation.determined);
+  EXPECT_EQ(result.applied_to({}), Workshop{});
+}
+
+TEST(CouponFit, HazeAndTheOtherReadingsDoNotTouchOneAnother) {
+  CouponReadings readings = sound_readings();
+  const CouponFit without = fit(readings);
+  EXPECT_FALSE(without.haze);
+  EXPECT_EQ(without.values().size(), 5U);
+  const CouponReadings haze = haze_readings(12.0, 7.0);
+  readings.haze = haze.haze;
+  const CouponFit both = fit(readings);
+  const CouponFit alone = fit(haze);
+  EXPECT_EQ(both.values().size(), 7U);
+  const auto expect_same = [](const FittedValue& a, const FittedValue& b) {
+    EXPECT_NEAR(a.value, b.value, 1e-6 * b.uncertainty) << a.key;
+    EXPECT_NEAR(a.uncertainty, b.uncertainty, 1e-5 * b.uncertainty) << a.key;
+  };
+  expect_same(both.sigma, without.sigma);
+  expect_same(both.diameter, without.diameter);
+  expect_same(both.pitch_error, without.pitch_error);
+  expect_same(both.roughness, alone.roughness);
+  expect_same(both.correlation, alone.correlation);
+}
+
+TEST(CouponFit, HazeThatContradictsTheOthersIsNamed) {
+  CouponReadings readings = haze_readings(12.0, 5.0);
+  readings.haze[1].ratio->value *= 3.0;
+  EXPECT_THAT(refusal(readings), AllOf(HasSubstr("m.toml: haze[1].light_ratio (F): "),
+                                       HasSubstr("standard deviations")));
 }
 
 TEST(CouponFit, NoReadingsAreRefused) {

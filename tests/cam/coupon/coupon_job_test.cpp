@@ -3,12 +3,14 @@
 
 #include <gmock/gmock.h>
 
+#include <numbers>
 #include <stop_token>
 
 #include "cam/coupon/coupon_fit.h"
 #include "cam/post/program_reader.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {
@@ -69,7 +71,9 @@ TEST(CouponJob, PassesLieWhereTheReadingsSay) {
   const TempFolder folder;
   const CouponResult result = make(folder);
   const CouponOptions options;
-  for (const CouponPad& pad : result.layout.pads) {
+  std::vector<CouponPad> pads = result.layout.pads;
+  pads.push_back(result.layout.flat);
+  for (const CouponPad& pad : pads) {
     std::vector<double> rows;
     const auto take = [&](const GcodeMotion& motion, int) {
       const bool row = !motion.rapid && motion.start.y() == motion.end.y() &&
@@ -113,6 +117,22 @@ TEST(CouponJob, BallsOfEverySizeHaveACoupon) {
       EXPECT_GT(result.layout.pads[i].box.min().x(),
                 result.layout.pads[i - 1].box.max().x() + 2.0 * diameter);
     }
+  }
+}
+
+/// Polish leaves less than a part in 1e8 of the ripples of the flat pad, which is not smaller than
+/// 3 x 4 mm.
+TEST(CouponJob, TheFlatPadIsFlatAfterPolishing) {
+  for (const double sigma : {0.0, 0.002, 0.01, 0.03, 0.2}) {
+    CouponOptions options;
+    options.workshop.polish.sigma = sigma;
+    options.depth = 0.2;
+    const CouponPad flat = coupon_layout(options).flat;
+    const double polished = sigma > 0.0 ? sigma : 0.03;
+    EXPECT_LT(PolishTransfer{polished}.at(2.0 * std::numbers::pi / flat.pitch), 1e-8) << sigma;
+    EXPECT_GE(flat.box.sizes().minCoeff(), 3.0 - 1e-9) << sigma;
+    EXPECT_LE(flat.box.sizes().maxCoeff(), 4.1) << sigma;
+    EXPECT_GE(flat.pitch, 0.001);
   }
 }
 
@@ -249,6 +269,52 @@ TEST_F(WorkshopFitTest, CommentsOfTheWorkshopStay) {
   task_.workshop = parse_workshop(once, "mine");
   fit_workshop(task_);
   EXPECT_EQ(read_bytes(task_.out), once);
+}
+
+/// The comments of a fit without haze are as they were before there was any.
+TEST_F(WorkshopFitTest, HazeThatWasNotReadIsNotMentioned) {
+  task_.workshop_text = "[finish]\npitch = 0.05\n";
+  task_.workshop = parse_workshop(task_.workshop_text, "mine");
+  fit_workshop(task_);
+  const std::string text = read_bytes(task_.out);
+  EXPECT_EQ(text.substr(text.find('\n') + 1), R"(#   polish.sigma is not determined, left as it was
+#   polish.order is not determined, left as it was
+#   polish.floor is not determined, left as it was
+#   tool.diameter is not determined, left as it was
+#   finish.pitch_error = 0.0005 +- 0.00075
+[finish]
+pitch_error = 5e-04
+pitch = 0.05
+)");
+}
+
+TEST_F(WorkshopFitTest, HazeGivesThePolishItsRoughness) {
+  CouponReadings readings;
+  for (const double angle : {1.0, 2.0, 3.0, 4.0}) {
+    const HazePlace place{angle, 2.8e-5};
+    CouponState state;
+    state.roughness = {12.0, 6.0};
+    const double ratio = state.haze_ratio(place, readings.light);
+    readings.haze.push_back({place, Reading{ratio, 0.1 * ratio}});
+  }
+  std::string text = "[[haze]]\n";
+  for (const HazeReadings& haze : readings.haze) {
+    text += "angle_deg = " + shortest_text(haze.place.angle) + "\nsolid_angle_sr = 2.8e-5\n" +
+            "light_ratio = " + shortest_text(haze.ratio->value) +
+            "\nlight_ratio_uncertainty = " + shortest_text(haze.ratio->uncertainty) + "\n" +
+            (&haze == &readings.haze.back() ? "" : "[[haze]]\n");
+  }
+  testing::write_bytes(task_.readings, text);
+  task_.workshop_text = "[polish]\nroughness = 3  # a guess\n";
+  task_.workshop = parse_workshop(task_.workshop_text, "mine");
+  const CouponFit fit = fit_workshop(task_);
+  EXPECT_NEAR(fit.roughness.value, 12.0, 1e-2);
+  EXPECT_NEAR(fit.correlation.value, 6.0, 1e-2);
+  EXPECT_EQ(read_workshop(task_.out), fit.applied_to(task_.workshop));
+  const std::string written = read_bytes(task_.out);
+  EXPECT_THAT(written, HasSubstr("\n#   polish.roughness = 12 +- "));
+  EXPECT_THAT(written, HasSubstr("\n#   polish.correlation = 6 +- "));
+  EXPECT_THAT(written, HasSubstr("  # a guess\n"));
 }
 
 TEST_F(WorkshopFitTest, AFileOfTheUsersIsKeptUnlessForced) {

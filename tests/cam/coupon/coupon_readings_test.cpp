@@ -20,9 +20,8 @@ using ::testing::StartsWith;
 
 CouponReadings expected() { return expected_readings(coupon_layout(CouponOptions{}), Workshop{}); }
 
-/// The template with every reading filled in as it is expected.
-std::string filled_in() {
-  std::string text = readings_template(expected());
+/// A template with every reading filled in as it is expected.
+std::string filled_in(std::string text = readings_template(expected())) {
   const std::string comment = "  # expected: about ";
   for (std::size_t at = text.find(comment); at != std::string::npos; at = text.find(comment)) {
     const std::size_t line = text.rfind("\n# ", at) + 1;
@@ -45,7 +44,8 @@ TEST(CouponReadings, TheTemplateIsThatOfEarlierVersions) {
       {{40.0, Reading{39.96, 0.03}}},
       {{0.09, Reading{0.323, 0.003}}},
       {{0.06, Reading{2.26e-3, 1.13e-4}, std::nullopt, Reading{0.1, 0.015}}},
-      {632.8e-6, 1.5}};
+      {632.8e-6, 1.5},
+      {}};
   const std::string text = readings_template(sample);
   EXPECT_EQ(text.substr(text.find("\n[light]")), R"(
 [light]
@@ -115,6 +115,65 @@ TEST(CouponReadings, BadValuesAreNamedWithFileKeyAndRule) {
               HasSubstr("mark[0].distance_uncertainty_mm: 0"));
   EXPECT_THAT(refusal("[[pad]]\npitch_mm = -0.1\n"), HasSubstr("pad[0].pitch_mm: -0.1"));
   EXPECT_THAT(refusal("[light]\nwavelength_nm = 0.532\n"), HasSubstr("light.wavelength_nm: 0.532"));
+}
+
+/// What a workshop with a roughness asks for.
+CouponReadings rough_expected() {
+  Workshop shop;
+  shop.polish.roughness = 10.0;
+  return expected_readings(coupon_layout(CouponOptions{}), shop);
+}
+
+TEST(CouponReadings, HazeIsReadAsItStands) {
+  const CouponReadings wanted = rough_expected();
+  const CouponReadings read = parse_readings(filled_in(readings_template(wanted)), "m.toml");
+  ASSERT_EQ(read.haze.size(), 4U);
+  EXPECT_EQ(read.count(), wanted.count());
+  for (std::size_t i = 0; i < read.haze.size(); ++i) {
+    EXPECT_DOUBLE_EQ(read.haze[i].place.angle, wanted.haze[i].place.angle);
+    EXPECT_DOUBLE_EQ(read.haze[i].place.solid_angle, wanted.haze[i].place.solid_angle);
+    ASSERT_TRUE(wanted.haze[i].ratio && read.haze[i].ratio);
+    EXPECT_NEAR(read.haze[i].ratio->value, wanted.haze[i].ratio->value,
+                5e-3 * wanted.haze[i].ratio->value);
+  }
+}
+
+/// A workshop that does not know its roughness is told where to measure.
+TEST(CouponReadings, HazeIsAskedForWhereItIsNotKnown) {
+  const CouponReadings asked = expected();
+  ASSERT_EQ(asked.haze.size(), 4U);
+  const std::string text = readings_template(asked);
+  EXPECT_THAT(text, HasSubstr("[[haze]]\nangle_deg = 1.4\nsolid_angle_sr = 2.8e-05\n"
+                              "# light_ratio =\n# light_ratio_uncertainty =\n"));
+  const CouponReadings read = parse_readings(text, "m.toml");
+  EXPECT_EQ(read.haze.size(), 4U);
+  EXPECT_FALSE(read.haze[0].ratio.has_value());
+}
+
+TEST(CouponReadings, BadHazeIsNamedWithFileKeyAndRule) {
+  const auto haze = [&](const std::string& angle, const std::string& solid_angle,
+                        const std::string& ratio, const std::string& more = "") {
+    return refusal("[[haze]]\nangle_deg = " + angle + "\nsolid_angle_sr = " + solid_angle +
+                   "\nlight_ratio = " + ratio + "\n" +
+                   (more.empty() ? "light_ratio_uncertainty = 1e-6\n" : more));
+  };
+  for (const char* angle : {"0", "-2", "61", "nan", "\"2\""}) {
+    EXPECT_THAT(haze(angle, "3e-5", "1e-5"), HasSubstr("m.toml: haze[0].angle_deg: ")) << angle;
+  }
+  for (const char* extent : {"0", "28", "inf"}) {
+    EXPECT_THAT(haze("2", extent, "1e-5"), HasSubstr("haze[0].solid_angle_sr: ")) << extent;
+  }
+  for (const char* ratio : {"0", "-1e-5", "1.2", "nan"}) {
+    EXPECT_THAT(haze("2", "3e-5", ratio), HasSubstr("haze[0].light_ratio: ")) << ratio;
+  }
+  EXPECT_THAT(
+      haze("2", "2.8e-5", "0.01"),
+      HasSubstr("m.toml: haze[0].light_ratio: 0.01: must be at most 0.00269 at this angle"));
+  EXPECT_THAT(haze("2", "3e-5", "1e-5", "light_ratio_uncertainty = 0\n"),
+              HasSubstr("haze[0].light_ratio_uncertainty: 0"));
+  EXPECT_THAT(haze("2", "3e-5", "1e-5", "\n"), HasSubstr("a reading needs its uncertainty"));
+  EXPECT_THAT(haze("2", "3e-5", "1e-5", "ratio = 1\n"), HasSubstr("haze[0]"));
+  EXPECT_THAT(refusal("[[haze]]\nangle_deg = 2\n"), HasSubstr("solid_angle_sr"));
 }
 
 TEST(CouponReadings, WhatItDoesNotKnowIsRefused) {

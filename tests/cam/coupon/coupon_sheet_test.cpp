@@ -32,14 +32,26 @@ std::size_t count_of(const std::string& text, const std::string& part) {
 }
 
 TEST(CouponSheet, HasEveryReadingThatTheTemplateHas) {
-  const CouponSheet sheet = sheet_of({});
-  const std::string page = coupon_sheet(sheet);
-  const std::string file = readings_template(sheet.expected);
-  for (const char* key : {"distance_mm", "width_mm", "before_um", "after_um", "order_ratio"}) {
-    EXPECT_EQ(count_of(page, std::string("<code>") + key + "</code>"),
-              count_of(file, std::string("# ") + key + " ="))
-        << key;
+  for (const double roughness : {0.0, 10.0}) {
+    CouponOptions options;
+    options.workshop.polish.roughness = roughness;
+    const CouponSheet sheet = sheet_of(options);
+    const std::string page = coupon_sheet(sheet);
+    const std::string file = readings_template(sheet.expected);
+    for (const char* key :
+         {"distance_mm", "width_mm", "before_um", "after_um", "order_ratio", "light_ratio"}) {
+      EXPECT_EQ(count_of(page, std::string("<code>") + key + "</code>"),
+                count_of(file, std::string("# ") + key + " ="))
+          << key;
+    }
   }
+}
+
+TEST(CouponSheet, TellsHowWellHazeWillBeKnownWhereItIsExpected) {
+  CouponOptions options;
+  EXPECT_THAT(coupon_sheet(sheet_of(options)), Not(HasSubstr("roughness to")));
+  options.workshop.polish.roughness = 10.0;
+  EXPECT_THAT(coupon_sheet(sheet_of(options)), HasSubstr("roughness to "));
 }
 
 TEST(CouponSheet, NeedsNothingFromElsewhere) {
@@ -66,7 +78,8 @@ TEST(CouponSheet, TheDrawingNamesEveryFeatureEitherWayRound) {
     for (const char* name : {"A", "B", "G1", "G2", "G3", "G4", "G5"}) {
       EXPECT_THAT(drawing, HasSubstr(std::string(">") + name + "</text>"));
     }
-    for (const char* pad : {">P1", ">P2", ">P3", ">P4", ">P5", "0.135</text>", "A–B 40</text>"}) {
+    for (const char* pad :
+         {">P1", ">P2", ">P3", ">P4", ">P5", "0.135</text>", ">F", "A–B 40</text>"}) {
       EXPECT_THAT(drawing, HasSubstr(pad));
     }
   }

@@ -216,6 +216,7 @@ inline CouponReadings with_noise(CouponReadings readings, std::uint32_t seed) {
     spoil(pad.after);
     spoil(pad.orders);
   }
+  for (HazeReadings& haze : readings.haze) spoil(haze.ratio);
   return readings;
 }
 

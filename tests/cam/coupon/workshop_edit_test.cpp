@@ -39,6 +39,15 @@ TEST(WorkshopEdit, OrderAndFloorAreReplacedToo) {
             "[polish]\nfloor = 0.05\norder = 4  # felt\nsigma = 0.03\n");
 }
 
+TEST(WorkshopEdit, RoughnessAndCorrelationAreReplacedToo) {
+  const std::string text = "[polish]\nroughness = 3  # felt\nsigma = 0.03\n";
+  Workshop shop = parse_workshop(text, "shop.toml");
+  shop.polish.roughness = 12.5;
+  shop.polish.correlation = 7.0;
+  EXPECT_EQ(edited_workshop(text, shop),
+            "[polish]\ncorrelation = 7\nroughness = 12.5  # felt\nsigma = 0.03\n");
+}
+
 TEST(WorkshopEdit, KeysAndTablesThatAreMissingAreAdded) {
   const std::string text = "[finish]  # raster\npitch = 0.05";
   EXPECT_EQ(
