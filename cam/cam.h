@@ -26,6 +26,8 @@ inline constexpr const char* kMilledMesh = "milled.ply";
 inline constexpr const char* kMilledPicture = "milled.png";  ///< By rays.
 inline constexpr const char* kWall = "wall.png";  ///< As the part is judged: by waves or rays.
 inline constexpr const char* kLeakage = "leakage.png";
+/// Target, picture as designed, wall.png, and the surface.
+inline constexpr const char* kOverview = "overview.png";
 inline constexpr const char* kReport = "report.json";
 inline constexpr const char* kPage = "report.html";
 }  // namespace cam_file

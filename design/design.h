@@ -63,6 +63,17 @@ struct DesignResult {
   std::optional<Colors> colors;
   Lens lens;  ///< Best surface so far, at the resolution reached.
   std::vector<ConvergenceRow> convergence;
+
+  /// As designed, then the wall's or, without that, the part's as made.
+  [[nodiscard]] std::vector<Image> pictures() const {
+    std::vector<Image> all{lens.render};
+    if (wall) {
+      all.push_back(wall->picture);
+    } else if (made) {
+      all.push_back(made->picture);
+    }
+    return all;
+  }
 };
 
 /// Designs a lens that projects `target` (linear light, any size, not all black), coarse to fine

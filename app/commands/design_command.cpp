@@ -20,7 +20,6 @@
 #include <utility>
 #include <vector>
 
-#include "app/commands/overview.h"
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
@@ -39,6 +38,7 @@
 #include "core/io/checkpoint_file.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
+#include "core/lens/overview.h"
 #include "core/optics/light_source.h"
 #include "core/optics/picture_blur.h"
 #include "core/page/drawings.h"
@@ -445,8 +445,9 @@ nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& d
 void write_design(const fs::path& folder, const DesignResult& result, const Console& console) {
   PendingFiles files(folder);
   files.add(lens_file::kConvergence, convergence_csv(result.convergence));
-  files.add(lens_file::kOverview,
-            [&](const fs::path& beside) { write_image(draw_overview(result), beside); });
+  files.add(lens_file::kOverview, [&](const fs::path& beside) {
+    write_image(draw_overview(result.lens, result.pictures()), beside);
+  });
   files.add(lens_file::kSetup,
             light_drawing_file(result.lens.setup, result.lens.surface.vertices.row(2).maxCoeff()));
   if (result.colors) {

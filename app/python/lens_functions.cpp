@@ -14,7 +14,6 @@
 
 #include "app/commands/cam_command.h"
 #include "app/commands/design_command.h"
-#include "app/commands/overview.h"
 #include "app/commands/settings.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
@@ -27,6 +26,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/lens_folder.h"
+#include "core/lens/overview.h"
 #include "design/design.h"
 #include "design/render.h"
 #include "design/setup/option_tables.h"
@@ -74,8 +74,9 @@ ColorImage displayed(const Image& image) {
 
 /// Target, projected picture, that of the part as made if it is known, and the surface.
 py::bytes png_of(const LensObject& lens) {
-  const std::vector<unsigned char> png = run_released(
-      [&](const RunControl&) { return encode_png(displayed(app::draw_overview(lens.design))); });
+  const std::vector<unsigned char> png = run_released([&](const RunControl&) {
+    return encode_png(displayed(draw_overview(lens.design.lens, lens.design.pictures())));
+  });
   return {reinterpret_cast<const char*>(png.data()), png.size()};
 }
 

@@ -20,6 +20,7 @@
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
+#include "core/lens/overview.h"
 #include "core/mesh/mesh_files.h"
 #include "core/text/words.h"
 #include "machine/gcode/program_seal.h"
@@ -40,8 +41,9 @@ constexpr std::string_view kJobKey = "job: ";
 
 /// Files that a cut writes beside its programs.
 constexpr std::array kBesidePrograms{
-    cam_file::kReport, cam_file::kPage,    cam_file::kMilledMesh,    cam_file::kMilledPicture,
-    cam_file::kWall,   cam_file::kLeakage, lens_file::kPartSurfaces, lens_file::kCausePictures};
+    cam_file::kReport,        cam_file::kPage,          cam_file::kMilledMesh,
+    cam_file::kMilledPicture, cam_file::kWall,          cam_file::kLeakage,
+    cam_file::kOverview,      lens_file::kPartSurfaces, lens_file::kCausePictures};
 
 /// check_seal(); unreadable files have none.
 std::optional<bool> seal_of(const fs::path& path) {
@@ -188,6 +190,12 @@ void add_prediction_files(const Prediction& prediction, const Lens& lens, Pendin
             [&](const fs::path& beside) { write_ply(prediction.milled, beside); });
   add_picture(cam_file::kMilledPicture, prediction.leakage);
   add_picture(cam_file::kWall, prediction.judged());
+  files.add(cam_file::kOverview, [&prediction, &lens, total](const fs::path& beside) {
+    const LeakageResult& judged = prediction.judged();
+    write_image(draw_overview(lens, {judged.designed.picture.image(total),
+                                     judged.part().picture.image(total)}),
+                beside);
+  });
   files.add(cam_file::kLeakage, [&](const fs::path& beside) {
     write_image(leakage_picture(prediction.leakage), beside);
   });

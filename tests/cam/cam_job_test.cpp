@@ -50,9 +50,10 @@ TEST(CamJob, WritesProgramsPicturesAndReport) {
   EXPECT_TRUE(result.done()) << result.message;
   std::vector<std::string> names;
   for (const auto& file : result.files) names.push_back(file.filename().string());
-  EXPECT_THAT(names, ::testing::ElementsAre("rough.ngc", "semi.ngc", "finish.ngc", "milled.ply",
-                                            "milled.png", "wall.png", "leakage.png", "part.exr",
-                                            "causes.exr", "report.html", "report.json"));
+  EXPECT_THAT(names,
+              ::testing::ElementsAre("rough.ngc", "semi.ngc", "finish.ngc", "milled.ply",
+                                     "milled.png", "wall.png", "overview.png", "leakage.png",
+                                     "part.exr", "causes.exr", "report.html", "report.json"));
   EXPECT_EQ(folder.file_count(), names.size());
   const auto report = nlohmann::json::parse(read_bytes(folder / "report.json"));
   EXPECT_DOUBLE_EQ(report["z_offset"].get<double>(), result.report.z_offset);

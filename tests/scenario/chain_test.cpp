@@ -161,8 +161,8 @@ TEST_F(Chain, CamWritesAProgramAndAReport) {
   EXPECT_EQ(outcome.json()["status"], "done");
   EXPECT_EQ(listing(at("lens/cam")),
             (std::vector<std::string>{"causes.exr", "finish.ngc", "leakage.png", "milled.ply",
-                                      "milled.png", "part.exr", "report.html", "report.json",
-                                      "rough.ngc", "wall.png"}));
+                                      "milled.png", "overview.png", "part.exr", "report.html",
+                                      "report.json", "rough.ngc", "wall.png"}));
   const nlohmann::json report = nlohmann::json::parse(content(at("lens/cam/report.json")));
   EXPECT_TRUE(report.contains("z_offset"));
   const nlohmann::json info = run({"info", path("lens/cam/finish.ngc"), "--json"}).json();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/commands/overview.h"
+#include "core/lens/overview.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/screen.h"
 
-namespace lensforge::app {
+namespace lensforge {
 namespace {
 
 constexpr int kPanelSide = 512;       ///< Longer side of one panel, pixels.
@@ -117,8 +117,7 @@ void paste(Image& page, const Image& panel, int column) {
   }
 }
 
-}  // namespace
-
+/// The surface alone, linear light.
 Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int columns, int rows) {
   OpticalSetup seen = setup;
   seen.image_origin = Eigen::Vector2d::Zero();
@@ -142,18 +141,14 @@ Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int column
   return resample(image, columns, rows);
 }
 
-Image draw_overview(const DesignResult& result) {
-  const Lens& lens = result.lens;
+}  // namespace
+
+Image draw_overview(const Lens& lens, const std::vector<Image>& pictures) {
   const int longer = std::max(lens.target.columns(), lens.target.rows());
   const int columns = std::max(1, lens.target.columns() * kPanelSide / longer);
   const int rows = std::max(1, lens.target.rows() * kPanelSide / longer);
-  std::vector<Image> panels = {resample(lens.target, columns, rows),
-                               resample(lens.render, columns, rows)};
-  if (result.wall) {
-    panels.push_back(resample(result.wall->picture, columns, rows));
-  } else if (result.made) {
-    panels.push_back(resample(result.made->picture, columns, rows));
-  }
+  std::vector<Image> panels = {resample(lens.target, columns, rows)};
+  for (const Image& picture : pictures) panels.push_back(resample(picture, columns, rows));
   const bool shaped = lens.setup.outline.has_value();
   panels.push_back(draw_relief(shaped ? lens_part(lens, Executor::serial()).mesh : lens.surface,
                                lens.setup, columns, rows));
@@ -165,4 +160,4 @@ Image draw_overview(const DesignResult& result) {
   return page;
 }
 
-}  // namespace lensforge::app
+}  // namespace lensforge
