@@ -96,7 +96,7 @@ FluxPicture light_of_cells(const SurfaceField& field, const FieldRenderSetup& se
   if (!waves) return render_cells(field, setup, cells, executor, control);
   const Eigen::Vector2i& pixels = setup.optics.pixels;
   return {pixels.x(), pixels.y(),
-          wave_flux_of({cells, setup.whole}, setup.optics, setup.grid, field, *waves, executor,
+          wave_flux_of({setup.grid, cells, setup.whole}, setup.optics, field, *waves, executor,
                        control)};
 }
 

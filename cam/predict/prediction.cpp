@@ -124,6 +124,17 @@ ReportMap height_map(const LeakMap& map) {
   return heights;
 }
 
+/// Where the part leaks what the judged picture has too much. Places and remedies are those of the
+/// surface. Haze is no place's: with it the map's total would be less than the leakage, and pixels
+/// that it alone lights would count light of good places.
+LeakMap leak_map(const LeakageChain& chain, const Prediction& prediction,
+                 const FieldRenderSetup& setup, const Executor& executor) {
+  const LeakageResult& judged = prediction.judged();
+  const std::vector<double> weights =
+      pixels_with_surplus(judged.clear_part().picture, judged.designed.picture);
+  return map_leakage(chain.designed, chain.part(), setup, weights, kLeakCell, executor);
+}
+
 }  // namespace
 
 Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const Executor& executor,
@@ -175,14 +186,8 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
     places_chain = by_waves;
   }
   result.sampling = check_sampling(chain, result.leakage, lens.target, setup, executor, control);
-  // Places and remedies are those of the surface. Haze is no place's: with it the map's total would
-  // be less than the leakage, and pixels that it alone lights would count light of good places.
-  const LeakageResult& judged = result.judged();
-  const std::vector<double> weights =
-      pixels_with_surplus(judged.clear_part().picture, judged.designed.picture);
-  const LeakMap map =
-      map_leakage(chain.designed, chain.part(), setup, weights, kLeakCell, executor);
-  result.places = worst_places(map, places_chain, judged, setup, {}, executor);
+  const LeakMap map = leak_map(chain, result, setup, executor);
+  result.places = worst_places(map, places_chain, result.judged(), setup, {}, executor);
   result.creases = creases.map();
   result.height = height_map(map);
   const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;

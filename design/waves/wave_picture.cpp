@@ -330,9 +330,9 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
 }
 
 std::vector<double> wave_flux_of(const WavePart& part, const OpticalSetup& setup,
-                                 const GridWindow& grid, const SurfaceField& surface,
-                                 const WaveOptions& options, const Executor& executor,
-                                 const RunControl& control) {
+                                 const SurfaceField& surface, const WaveOptions& options,
+                                 const Executor& executor, const RunControl& control) {
+  const GridWindow& grid = part.grid;
   const double height = middle_height(grid, surface);
   const SourceKernel kernel = source_kernel(setup, height);
   WaveScene scene = scene_of(setup, kernel, options, control);

@@ -74,15 +74,15 @@ std::vector<std::vector<double>> wave_flux(const OpticalSetup& setup, const Grid
 /// A rectangle of a lens. Its window fades over ramp_width(), half of it beyond its sides: what
 /// rectangles side by side send adds up to what they send together.
 struct WavePart {
-  CellRange cells;  ///< Of the grid.
+  GridWindow grid;  ///< Over the whole lens.
+  CellRange cells;
   /// What the whole lens takes in, LightPath::intake(), mm², by wavelength; none: the grid's area.
   std::span<const double> whole;
 };
 /// wave_flux() of a part of one surface.
 std::vector<double> wave_flux_of(const WavePart& part, const OpticalSetup& setup,
-                                 const GridWindow& grid, const SurfaceField& surface,
-                                 const WaveOptions& options, const Executor& executor,
-                                 const RunControl& control);
+                                 const SurfaceField& surface, const WaveOptions& options,
+                                 const Executor& executor, const RunControl& control);
 /// mm. @param height  of the surface, about, mm.
 double ramp_width(const OpticalSetup& setup, double height, const WaveOptions& options);
 

@@ -230,7 +230,7 @@ TEST(WavePicture, PartsSideBySideAddUpToTheWhole) {
     for (const CellRange& cells : {CellRange{0, 0, 150, 200}, CellRange{150, 0, 170, 200},
                                    CellRange{0, 200, 150, 120}, CellRange{150, 200, 170, 120}}) {
       const std::vector<double> one =
-          wave_flux_of({cells, {&whole, 1}}, setup, grid, surface, {}, Executor::cpu(2), {});
+          wave_flux_of({grid, cells, {&whole, 1}}, setup, surface, {}, Executor::cpu(2), {});
       EXPECT_NEAR(sum_of(one), static_cast<double>(cells.columns * cells.rows) / (320 * 320), 0.02);
       for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += one[i];
     }
