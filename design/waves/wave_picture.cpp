@@ -34,25 +34,29 @@ constexpr std::int64_t kBatch = 16;
 /// the time for as many as there are. A 128² portrait on 25 mm has 2.3e9.
 constexpr double kKeptBytes = 1.5e9;
 
+/// A stretch of an axis of `all` cells, with ramps of a width but at the ends of the axis.
+Stretch stretch_of(std::int64_t begin, std::int64_t count, std::int64_t all, double ramp) {
+  const std::int64_t end = begin + count;
+  // A ramp neither leaves the axis nor meets the other.
+  const auto width = [&](std::int64_t room) {
+    return std::min({static_cast<std::int64_t>(std::llround(ramp)), 2 * room, count});
+  };
+  Stretch one{begin, end, width(begin), width(all - end)};
+  one.begin -= one.rise / 2;
+  one.end += one.fall - one.fall / 2;
+  return one;
+}
+
 /// @param tile, overlap  cells; 0: one stretch.
 std::vector<Stretch> stretches(std::int64_t cells, double tile, double overlap) {
   const auto all = static_cast<double>(cells);
   const std::int64_t count =
       tile > 0.0 ? std::max<std::int64_t>(1, std::llround(std::min(all, all / tile))) : 1;
-  const std::int64_t ramp =
-      std::llround(std::min(overlap, std::floor(all / static_cast<double>(count))));
+  const double ramp = std::min(overlap, std::floor(all / static_cast<double>(count)));
   std::vector<Stretch> parts;
   for (std::int64_t k = 0; k < count; ++k) {
-    Stretch one{cells * k / count, cells * (k + 1) / count, 0, 0};
-    if (k > 0) {
-      one.begin -= ramp / 2;
-      one.rise = ramp;
-    }
-    if (k + 1 < count) {
-      one.end += ramp - ramp / 2;
-      one.fall = ramp;
-    }
-    parts.push_back(one);
+    const std::int64_t begin = cells * k / count;
+    parts.push_back(stretch_of(begin, cells * (k + 1) / count - begin, cells, ramp));
   }
   return parts;
 }
@@ -213,10 +217,6 @@ std::vector<WaveColor> wave_colors(const OpticalSetup& setup, double wavelength)
   return colors;
 }
 
-}  // namespace
-
-namespace {
-
 /// Setup with pixels as the source's blur asks for.
 OpticalSetup in_parts(const OpticalSetup& setup, const SourceKernel& kernel) {
   OpticalSetup parts = setup;
@@ -264,10 +264,6 @@ void add_tiles(const std::vector<Tile>& tiles, const WaveScene& scene, PointLigh
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// Pictures of surfaces that are sampled tile by tile.
 std::vector<std::vector<double>> pictures_of(const WaveScene& scene, const SourceKernel& kernel,
                                              const std::vector<Tile>& tiles, const GridWindow& grid,
@@ -301,19 +297,6 @@ std::vector<std::vector<double>> pictures_of(const WaveScene& scene, const Sourc
     pictures.emplace_back(flux.begin(), flux.end());
   }
   return pictures;
-}
-
-/// A stretch of an axis of `all` cells, with ramps of a width but at the ends of the axis.
-Stretch stretch_of(std::int64_t begin, std::int64_t count, std::int64_t all, double ramp) {
-  const std::int64_t end = begin + count;
-  // A ramp neither leaves the axis nor meets the other.
-  const auto width = [&](std::int64_t room) {
-    return std::min({static_cast<std::int64_t>(std::llround(ramp)), 2 * room, count});
-  };
-  Stretch one{begin, end, width(begin), width(all - end)};
-  one.begin -= one.rise / 2;
-  one.end += one.fall - one.fall / 2;
-  return one;
 }
 
 }  // namespace
