@@ -398,7 +398,7 @@ void LbfgsOn<Exec>::remember() {
 }
 
 /// The weak Wolfe line search along direction_ from current_; next_ receives the accepted point.
-/// @return number of evaluations; `decreased` is true if a point of sufficient decrease was found.
+/// @return number of points looked at; `decreased` is true if one of sufficient decrease was found.
 template <class Exec>
 int LbfgsOn<Exec>::search(double slope, bool& decreased) {
   double low = 0.0;
@@ -419,6 +419,12 @@ int LbfgsOn<Exec>::search(double slope, bool& decreased) {
       low = step;
     }
     if (decreased && evaluations >= kEnoughEvaluations) return evaluations;
+    if (evaluations % kEnoughEvaluations == 0) {
+      // Looks at other points may have changed what the objective says of this one (NodeWaves).
+      evaluate(current_);
+      slope = product(direction_, current_.gradient);
+      if (!(slope < 0.0)) return evaluations;
+    }
     step = std::isinf(high) ? 2.0 * step : 0.5 * (low + high);
   }
   return options_.max_evaluations_per_step;

@@ -192,6 +192,21 @@ TEST(Lbfgs, EndsAtAPointWithoutDescent) {
   EXPECT_EQ(x, Eigen::VectorXd::Ones(kUnknowns));
 }
 
+/// A look at a far point lifts all values, as an objective does that plans anew for it.
+TEST(Lbfgs, GoesOnWhereALookElsewhereLiftsTheValue) {
+  double lift = 0.0;
+  const Objective f = [&](const Eigen::VectorXd& x, Eigen::VectorXd& g) {
+    if (x.norm() > 10.0) lift = 1.0;
+    g = 1e4 * x;
+    return 5e3 * x.squaredNorm() + lift;
+  };
+  Eigen::VectorXd x = Eigen::Vector2d(0.001, 0.002);
+  const LbfgsSummary summary = minimize(f, thorough(), x);
+  EXPECT_EQ(lift, 1.0);
+  EXPECT_LT(x.norm(), 1e-6);
+  EXPECT_NEAR(summary.value, 1.0, 1e-9);
+}
+
 TEST(Lbfgs, ThreadCountDoesNotChangeABit) {
   constexpr int kMany = 50000;
   const Objective f = [](const Eigen::VectorXd& x, Eigen::VectorXd& g) {
