@@ -412,8 +412,14 @@ Image corrected_target(const DesignTask& task, const DesignLog& log, const Level
     return corrected(target, picture_under(problem.setup, 1, picture(kCorrectionSamples)),
                      picture_under(problem.setup, 1, seen));
   }
-  return corrected_for_convolution(target, problem.setup, mesh.vertices.row(2).mean(), seen,
-                                   task.executor);
+  const double z = mesh.vertices.row(2).mean();
+  const Image aim = corrected_for_convolution(target, problem.setup, z, seen, task.executor);
+  if (!level.spline) return aim;
+  // The blur hides little of what too few rays do to the picture.
+  const auto blurred = [&](const PointPicture& of) {
+    return picture_by_convolution(problem.setup, z, of, task.executor);
+  };
+  return corrected(aim, blurred(picture(kCorrectionSamples)), blurred(seen));
 }
 
 /// @return false if it was asked to stop.

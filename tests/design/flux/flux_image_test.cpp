@@ -250,11 +250,13 @@ TEST(SourceBlur, APointOfLightBecomesTheSourcesImageWithItsMoments) {
   const OpticalSetup setup = wide_source();
   const SourceKernel kernel = source_kernel(setup, 5.0);
   SourceBlurOn<Executor> blur(kernel, kColumns, kRows, Executor::serial());
-  const std::size_t width = kColumns * static_cast<std::size_t>(kernel.parts);
+  const auto parts = static_cast<std::size_t>(kernel.parts);
   std::vector<double> in(part_count(kernel), 0.0);
-  // The four parts of the middle pixel.
-  for (const std::size_t y : {16U, 17U}) {
-    for (const std::size_t x : {20U, 21U}) in[y * width + x] = 0.25;
+  // All parts of the middle pixel, column 10 and row 8.
+  for (std::size_t y = 8 * parts; y < 9 * parts; ++y) {
+    for (std::size_t x = 10 * parts; x < 11 * parts; ++x) {
+      in[y * kColumns * parts + x] = 1.0 / static_cast<double>(parts * parts);
+    }
   }
   const std::span<const double> out = blur.apply(Executor::serial(), in);
   Eigen::Vector2d mean(0.0, 0.0);
@@ -270,6 +272,19 @@ TEST(SourceBlur, APointOfLightBecomesTheSourcesImageWithItsMoments) {
   }
   EXPECT_GT(expected.norm(), 0.2);
   EXPECT_LT((mean - expected).norm(), 1e-3);
+}
+
+TEST(SourceBlur, WiderImagesAreResolvedInFewerParts) {
+  OpticalSetup setup = testing::setup_of({21.0, 17.0}, {kColumns, kRows}, 100.0);
+  const auto parts = [&](double pixels) {
+    setup.extent.width = 1.0;
+    setup.extent.width = pixels / source_blur(setup, 5.0);
+    return source_kernel(setup, 5.0).parts;
+  };
+  EXPECT_EQ(parts(1e-9), 4);
+  EXPECT_EQ(parts(3.9), 4);
+  EXPECT_EQ(parts(5.0), 3);
+  EXPECT_EQ(parts(9.0), 2);
 }
 
 TEST(SourceBlur, WithoutASourcesExtentNothingChanges) {

@@ -124,6 +124,25 @@ TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
   EXPECT_EQ(levels[1].grid, (GridShape{323, 163}));
 }
 
+TEST(LevelPlan, PicturesOfAnExtendedLampAreCorrectedInTwiceTheRounds) {
+  DesignOptions options = with_levels(1);
+  options.model = SurfaceModel::kSpline;
+  options.light.model = LightModel::kRays;
+  options.light.source_angle = 2.0;
+  const std::vector<Level> levels = plan_levels({128, 64}, options);
+  ASSERT_EQ(levels.size(), 2U);
+  EXPECT_EQ(levels[0].rounds, 2);
+  EXPECT_EQ(levels[0].iterations, 120);
+  EXPECT_EQ(levels[1].rounds, 4);
+  EXPECT_EQ(levels[1].iterations, 36);
+  // Those of waves, and of a process, are not corrected.
+  options.light.model = LightModel::kWaves;
+  EXPECT_EQ(plan_levels({128, 64}, options)[1].rounds, 2);
+  options.light.model = LightModel::kRays;
+  options.made_by = MadeBy();
+  EXPECT_EQ(plan_levels({128, 64}, options)[0].rounds, 1);
+}
+
 TEST(LevelPlan, TheDefaultIsASplineWhereEachCellOfTheMeshHasAKnotCell) {
   const DesignOptions options;
   for (const int side : {4, 256, 527}) {
