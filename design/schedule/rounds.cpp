@@ -413,7 +413,7 @@ Image corrected_target(const DesignTask& task, const DesignLog& log, const Level
                      picture_under(problem.setup, 1, seen));
   }
   const double z = mesh.vertices.row(2).mean();
-  const Image aim = corrected_for_convolution(target, problem.setup, z, seen, task.executor);
+  Image aim = corrected_for_convolution(target, problem.setup, z, seen, task.executor);
   if (!level.spline) return aim;
   // The blur hides little of what too few rays do to the picture.
   const auto blurred = [&](const PointPicture& of) {

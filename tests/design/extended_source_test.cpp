@@ -94,8 +94,8 @@ TracedPicture traced(const SurfaceMesh& mesh, const OpticalSetup& setup, int cou
     const double u = (setup.lens_size.x() - hit.x()) / setup.lens_size.x() * setup.pixels.x();
     const double v = (setup.lens_size.y() - hit.y()) / setup.lens_size.y() * setup.pixels.y();
     if (u < 0.0 || v < 0.0 || u >= setup.pixels.x() || v >= setup.pixels.y()) continue;
-    picture.flux[static_cast<std::size_t>(static_cast<int>(v) * setup.pixels.x() +
-                                          static_cast<int>(u))] += 1.0;
+    const int pixel = static_cast<int>(v) * setup.pixels.x() + static_cast<int>(u);
+    picture.flux[static_cast<std::size_t>(pixel)] += 1.0;
   }
   return picture;
 }
@@ -147,7 +147,8 @@ TEST(ExtendedPicture, TheConvolutionIsCloseToTheSumOverTheSource) {
   // The finer picture is relative to more pixels; the rim lacks light from outside.
   for (int row = 3; row < 17; ++row) {
     for (int column = 3; column < 21; ++column) {
-      const auto i = static_cast<std::size_t>(row * 24 + column);
+      const int pixel = row * 24 + column;
+      const auto i = static_cast<std::size_t>(pixel);
       off = std::max(off, std::fabs(convolved[i] / (parts * parts) - exact[i]));
     }
   }

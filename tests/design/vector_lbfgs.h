@@ -36,7 +36,7 @@ inline LbfgsSummary minimize_lbfgs(const Objective& objective, const Preconditio
   };
   LbfgsOn<Executor> minimizer(evaluate, apply, options, executor);
   std::vector<double> point(x.begin(), x.end());
-  const LbfgsSummary summary = minimizer.run(observe, point);
+  LbfgsSummary summary = minimizer.run(observe, point);
   x = vector_of(point);
   return summary;
 }
