@@ -47,9 +47,9 @@ constexpr double kStartIterations = 0.375;  ///< At kStartPixels; grows with the
 constexpr double kStartPixels = 64.0;
 constexpr double kSplineIterations = 0.36;
 
-/// So many times as many in an extended source's light, because the picture that they aim at is
-/// corrected before each (needs_correction()). That photograph in light of 2 mrad ends at 0.0015
-/// without, at 0.0012 with more rounds of the spline alone, and at 0.0009.
+/// Factor on the rounds in an extended source's light, because the picture that they aim at is
+/// corrected before each (needs_correction()). A 128² photograph with deep blacks in light of 2
+/// mrad ends at 0.0015 without it, at 0.0012 with it for the spline alone, and at 0.0009.
 constexpr int kCorrectedRounds = 2;
 
 /// For a process: maximum mean width of the knot cells, in σ of the polish, so that the design can
