@@ -84,12 +84,6 @@ Image corrected(const Image& target, const std::vector<double>& exact,
   return aim;
 }
 
-Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, double z,
-                                const PointPicture& picture, const Executor& executor) {
-  return corrected(target, picture_under(setup, source_point_count(setup, z), picture),
-                   picture_by_convolution(setup, z, picture, executor));
-}
-
 SourceCheck check_source(const Lens& lens, const Executor& executor, const RunControl& control) {
   const double z = surface_height(lens);
   const auto point = [&](const OpticalSetup& setup) {

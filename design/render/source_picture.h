@@ -45,12 +45,6 @@ std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
 Image corrected(const Image& target, const std::vector<double>& exact,
                 const std::vector<double>& seen);
 
-/// corrected() for an optimiser that approximates by a convolution. @pre the source has an extent;
-/// target has setup.pixels.
-/// @param z  of the surface, mm. @param picture  projected by the surface.
-Image corrected_for_convolution(const Image& target, const OpticalSetup& setup, double z,
-                                const PointPicture& picture, const Executor& executor);
-
 /// @pre the lens's source has an extent.
 SourceCheck check_source(const Lens& lens, const Executor& executor,
                          const RunControl& control = {});

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/compute/scalar.h"
 #include "core/error.h"
@@ -413,13 +414,18 @@ Image corrected_target(const DesignTask& task, const DesignLog& log, const Level
                      picture_under(problem.setup, 1, seen));
   }
   const double z = mesh.vertices.row(2).mean();
-  Image aim = corrected_for_convolution(target, problem.setup, z, seen, task.executor);
-  if (!level.spline) return aim;
-  // The blur hides little of what too few rays do to the picture.
   const auto blurred = [&](const PointPicture& of) {
     return picture_by_convolution(problem.setup, z, of, task.executor);
   };
-  return corrected(aim, blurred(picture(kCorrectionSamples)), blurred(seen));
+  const std::vector<double> convolved = blurred(seen);
+  std::vector<double> exact =
+      picture_under(problem.setup, source_point_count(problem.setup, z), seen);
+  if (level.spline) {
+    // More rays from every point of the source would take minutes; the blur hides little of them.
+    const std::vector<double> fine = blurred(picture(kCorrectionSamples));
+    for (std::size_t i = 0; i < exact.size(); ++i) exact[i] += fine[i] - convolved[i];
+  }
+  return corrected(target, exact, convolved);
 }
 
 /// @return false if it was asked to stop.
