@@ -71,10 +71,9 @@ Lens make_lens(const DesignTask& task, SurfaceMesh mesh, Look look, const Execut
 
 /// Adds the haze of the roughness that a process leaves to its part's picture.
 /// @param picture, metrics  of the part.
-void add_haze(const std::optional<MadeBy>& process, const Lens& lens, Image& picture,
-              ImageMetrics& metrics, const Executor& executor) {
-  if (!process) return;
-  const Roughness roughness{process->roughness, process->correlation};
+void add_haze(const MadeBy& process, const Lens& lens, Image& picture, ImageMetrics& metrics,
+              const Executor& executor) {
+  const Roughness roughness{process.roughness, process.correlation};
   if (roughness.none()) return;
   const double height = lens.surface.vertices.row(2).mean();
   const Haze haze = haze_of(roughness, lens.setup, height, middle_wavelength(lens.setup));
@@ -85,43 +84,6 @@ void add_haze(const std::optional<MadeBy>& process, const Lens& lens, Image& pic
                  [](double value) { return static_cast<float>(value); });
   metrics = compare(picture, lens.target);
   metrics.flux_inside = picture.total() / lens.target.total();
-}
-
-/// Predicts the part by the design's own model of cutting and polishing.
-std::optional<DesignResult::Made> made_part(const DesignOptions& options, const Lens& lens,
-                                            const Executor& executor) {
-  if (!options.made_by || !lens.spline) return std::nullopt;
-  const int samples = samples_for(kPictureNodes, static_cast<double>(lens.spline->cell_count()));
-  const SampledSurface part = made_nodes(*lens.spline, *options.made_by, samples, executor);
-  DesignResult::Made made;
-  made.metrics =
-      evaluate(part.mesh, part.normals, lens.setup, lens.target, &made.picture, executor);
-  add_haze(options.made_by, lens, made.picture, made.metrics, executor);
-  return made;
-}
-
-/// The picture by waves, of the part where a process is given. @throw Interrupted
-std::optional<DesignResult::Wall> wall_of(const DesignOptions& options, const Lens& lens,
-                                          const Executor& executor, const RunControl& control) {
-  if (!lens.spline || !follows_waves(options, lens.setup)) return std::nullopt;
-  const WaveOptions waves = wave_options(options, lens.setup);
-  const SplineSurface surface(*lens.spline);
-  std::unique_ptr<const SurfaceField> field = std::make_unique<OpticalField>(surface);
-  if (options.made_by)
-    field = std::make_unique<MadeField>(*lens.spline, *options.made_by, executor);
-  const SurfaceField* const one = field.get();
-  std::vector<double> light =
-      wave_flux(lens.setup, wave_grid(lens.setup, surface), {&one, 1}, waves, executor, control)
-          .front();
-  DesignResult::Wall wall;
-  wall.wavelength = waves.wavelength;
-  const double total = lens.target.total();
-  for (double& pixel : light) pixel *= total;
-  wall.picture = image_of(light, lens.target.columns(), lens.target.rows());
-  wall.metrics = compare(wall.picture, lens.target);
-  wall.metrics.flux_inside = wall.picture.total() / total;
-  add_haze(options.made_by, lens, wall.picture, wall.metrics, executor);
-  return wall;
 }
 
 std::optional<DesignResult::Colors> colors_of(const Lens& lens, const Executor& executor,
@@ -171,10 +133,16 @@ DesignResult finished(const DesignTask& task, const DesignLog& log, const Surfac
     result.source = check_source(result.lens, task.executor, log.rendering("checking the source"));
   }
   result.colors = colors_of(result.lens, task.executor, reports);
-  if (task.options.made_by) log.report_rendering("rendering the part");
-  result.made = made_part(task.options, result.lens, task.executor);
-  result.wall =
-      wall_of(task.options, result.lens, task.executor, log.rendering("rendering the wall"));
+  if (!result.lens.spline) return result;
+  const DesignOptions& options = task.options;
+  if (options.made_by) {
+    log.report_rendering("rendering the part");
+    result.made = made_part(result.lens, *options.made_by, task.executor);
+  }
+  if (follows_waves(options, result.lens.setup)) {
+    result.wall = wall_of(result.lens, options.made_by, wave_options(options, result.lens.setup),
+                          task.executor, log.rendering("rendering the wall"));
+  }
   return result;
 }
 
@@ -199,6 +167,37 @@ DesignResult run_to_end(const DesignTask& task, DesignLog& log, Checkpoint& stat
 }
 
 }  // namespace
+
+DesignResult::Made made_part(const Lens& lens, const MadeBy& process, const Executor& executor) {
+  const int samples = samples_for(kPictureNodes, static_cast<double>(lens.spline->cell_count()));
+  const SampledSurface part = made_nodes(*lens.spline, process, samples, executor);
+  DesignResult::Made made;
+  made.metrics =
+      evaluate(part.mesh, part.normals, lens.setup, lens.target, &made.picture, executor);
+  add_haze(process, lens, made.picture, made.metrics, executor);
+  return made;
+}
+
+DesignResult::Wall wall_of(const Lens& lens, const std::optional<MadeBy>& process,
+                           const WaveOptions& waves, const Executor& executor,
+                           const RunControl& control) {
+  const SplineSurface surface(*lens.spline);
+  std::unique_ptr<const SurfaceField> field = std::make_unique<OpticalField>(surface);
+  if (process) field = std::make_unique<MadeField>(*lens.spline, *process, executor);
+  const SurfaceField* const one = field.get();
+  std::vector<double> light =
+      wave_flux(lens.setup, wave_grid(lens.setup, surface), {&one, 1}, waves, executor, control)
+          .front();
+  DesignResult::Wall wall;
+  wall.wavelength = waves.wavelength;
+  const double total = lens.target.total();
+  for (double& pixel : light) pixel *= total;
+  wall.picture = image_of(light, lens.target.columns(), lens.target.rows());
+  wall.metrics = compare(wall.picture, lens.target);
+  wall.metrics.flux_inside = wall.picture.total() / total;
+  if (process) add_haze(*process, lens, wall.picture, wall.metrics, executor);
+  return wall;
+}
 
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control) {

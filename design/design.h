@@ -85,6 +85,15 @@ struct DesignResult {
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control);
 
+/// Predicts the part that a process makes of a spline lens, by rays. @pre lens.spline
+DesignResult::Made made_part(const Lens& lens, const MadeBy& process, const Executor& executor);
+
+/// The picture by waves of a spline lens, or of the part that a process makes of it. @pre
+/// lens.spline @throw Interrupted
+DesignResult::Wall wall_of(const Lens& lens, const std::optional<MadeBy>& process,
+                           const WaveOptions& waves, const Executor& executor,
+                           const RunControl& control);
+
 /// Number that differs for pictures or options that give another result.
 /// @pre validate(options, target) passes.
 std::uint64_t design_identity(const Image& target, const DesignOptions& options);

@@ -63,24 +63,6 @@ Description part_options(CamOptions& cut) {
   return description_of(cut).only({"--part", "--shrinkage"});
 }
 
-/// The slopes that a scallop's pitch depends on are not known before the design; cam warns if they
-/// make it another.
-MadeBy process_of(const Workshop& shop, const DesignSettings& settings) {
-  const FinishProcess& finish = shop.process.finish;
-  const CamOptions& cut = settings.cut;
-  const MadeBy made{max_pitch(finish, shop.tool(finish.tool).radius(), kUnknownSlope),
-                    finish.along == PassAxis::kX,
-                    shop.polish.sigma,
-                    shop.polish.rim_depth,
-                    shop.polish.rim_length,
-                    settings.robust ? shop.tolerances.polish_sigma : 0.0,
-                    shop.polish.order,
-                    shop.polish.floor,
-                    shop.polish.roughness,
-                    shop.polish.correlation};
-  return cut.part == PartKind::kMould ? made.cast(cut.shrinkage) : made;
-}
-
 /// @throw InputError unless nothing is said of how a part is made.
 void refuse_part_options(const OptionSet& options, CamOptions& cut) {
   if (options.given("--robust")) {
@@ -124,9 +106,6 @@ void describe(Description& d, DesignSettings& settings) {
   d.text("--out", settings.out, "DIR", "lens folder to write").needed = true;
   describe(d, settings.design);
   describe(d, settings.design.light);
-  d.text("--source-picture", settings.source_picture, "FILE",
-         "picture of the lamp as seen from the lens, as wide as --source-angle or "
-         "--source-size; without it the lamp is an evenly lit disc");
   d.text("--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
          "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
          "in a picture, seen from the cutter's side")
@@ -169,7 +148,6 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
     throw InputError(settings.target +
                      ": is black all over: there is no light to place; use a picture with some");
   }
-  Workshop workshop;
   if (settings.made_by.empty()) {
     refuse_part_options(options, settings.cut);
     if (!options.given("--model")) {
@@ -183,24 +161,24 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
                        model_name(settings.design.model));
     }
     settings.design.model = SurfaceModel::kSpline;
-    if (settings.made_by != "default") workshop = read_workshop(settings.made_by);
+    if (settings.made_by != "default") settings.cut.workshop = read_workshop(settings.made_by);
   }
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
-  if (!settings.source_picture.empty()) {
-    const LoadedImage shape =
-        read_image(settings.source_picture, control, kDrawnSide, settings.background);
-    note_changes(settings, "--source-picture " + settings.source_picture, shape.changes);
-    settings.design.light.source_shape = shape_of(shape.image);
-  }
   LightOptions& light = settings.design.light;
+  if (!light.source_picture.empty()) {
+    const LoadedImage shape =
+        read_image(light.source_picture, control, kDrawnSide, settings.background);
+    note_changes(settings, "--source-picture " + light.source_picture, shape.changes);
+    light.source_shape = shape_of(shape.image);
+  }
   if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
   if (!settings.outline.empty()) {
     OutlineChoice choice = outline_from(settings.outline, settings.background, control);
     note_changes(settings, "--outline " + settings.outline, choice.changes);
     settings.design.outline = std::move(choice.outline);
   }
-  if (!settings.made_by.empty()) settings.design.made_by = process_of(workshop, settings);
+  if (!settings.made_by.empty()) settings.design.made_by = made_by(settings.cut, settings.robust);
   validate(settings.design, picture);
 }
 

@@ -20,7 +20,6 @@ namespace lensforge::app {
 struct DesignSettings {
   std::string target;
   std::string out;
-  std::string source_picture;  ///< File with the source's shape; empty: a disc.
   std::string outline;         ///< Edge of the lens; empty: its rectangle.
   Background background;       ///< Behind target, source's shape and outline.
   std::string made_by;         ///< Workshop file, or "default"; empty: not designed for a process.

@@ -26,6 +26,7 @@
 #include "core/text/number_text.h"
 #include "design/design.h"
 #include "design/render.h"
+#include "design/setup/lamps.h"
 #include "design/setup/option_tables.h"
 #include "design/waves/wave_picture.h"
 #include "export/solid/solid_reading.h"
@@ -144,12 +145,23 @@ void require_waves(const Scene& scene, const OptionSet& options, const RenderArg
   }
 }
 
+void put_lamp(const RenderArguments& arguments, CommandFrame& frame, RenderOptions& render) {
+  LightOptions& light = render.light;
+  if (light.lamp.empty()) return;
+  if (!light.source_picture.empty()) {
+    light.source_shape = shape_of(
+        read_image(light.source_picture, frame.control(), kDrawnSide, arguments.background).image);
+  }
+  put_lamp(light, render.setup);
+}
+
 /// The scene with everything that the options say instead.
 Scene adjusted(Scene scene, CommandFrame& frame, RenderArguments& arguments) {
   OptionSet& options = frame.options();
   arguments.render = scene.render;
   options.restate();
   scene.render = arguments.render;
+  put_lamp(arguments, frame, scene.render);
   if (scene.render.model == SurfaceModel::kSpline && !scene.spline) {
     throw InputError("--model spline: must be facet or smooth, since " + arguments.source +
                      " is no lens that was designed as a spline");

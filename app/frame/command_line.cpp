@@ -282,6 +282,8 @@ struct Subcommand {
 };
 
 constexpr std::array kSubcommands{
+    Subcommand{"plan", plan_command, "plan PICTURE",
+               "what lens this picture, lamp and wall ask for"},
     Subcommand{"design", design_command, "design TARGET --out DIR", "picture to lens folder"},
     Subcommand{"render", render_command, "render DIR|MESH|SOLID",
                "lens, mesh or STEP solid to picture and metrics"},

@@ -27,6 +27,7 @@ int coupon_command(const Arguments& arguments);
 int export_command(const Arguments& arguments);
 int send_command(const Arguments& arguments);
 int reflect_command(const Arguments& arguments);
+int plan_command(const Arguments& arguments);
 int view_command(const Arguments& arguments);
 int batch_command(const Arguments& arguments);
 int info_command(const Arguments& arguments);

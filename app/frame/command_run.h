@@ -174,6 +174,7 @@ CommandCall call_of(const Command<Settings>& command, const Settings& initial) {
 
 CommandCall reflect_call();
 CommandCall view_call();
+CommandCall plan_call();
 CommandCall nest_call();
 CommandCall coupon_call();
 CommandCall info_call();

@@ -317,6 +317,7 @@ void add_command(py::module_& module, const char* name, const app::CommandCall& 
 
 void add_plain_commands(py::module_& module) {
   add_command(module, "reflect", app::reflect_call(), {"--out", "--device"});
+  add_command(module, "plan", app::plan_call(), {"--device"});
   add_command(module, "view", app::view_call(), {"--out", "--device"});
   add_command(module, "nest", app::nest_call(), {"--out", "--device"});
   add_command(module, "coupon", app::coupon_call(), {"--out", "--device"});

@@ -487,6 +487,22 @@ void describe_limits(Description& d, CamOptions& o) {
 
 }  // namespace
 
+MadeBy made_by(const CamOptions& options, bool robust) {
+  const Workshop& shop = options.workshop;
+  const FinishProcess& finish = shop.process.finish;
+  const MadeBy made{max_pitch(finish, shop.tool(finish.tool).radius(), kUnknownSlope),
+                    finish.along == PassAxis::kX,
+                    shop.polish.sigma,
+                    shop.polish.rim_depth,
+                    shop.polish.rim_length,
+                    robust ? shop.tolerances.polish_sigma : 0.0,
+                    shop.polish.order,
+                    shop.polish.floor,
+                    shop.polish.roughness,
+                    shop.polish.correlation};
+  return options.part == PartKind::kMould ? made.cast(options.shrinkage) : made;
+}
+
 void describe(Description& d, CamOptions& options) {
   const Description shop = description_of(options.workshop);
   describe_tools(d, options, shop);

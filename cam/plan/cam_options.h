@@ -15,6 +15,7 @@
 #include "cam/workshop/workshop.h"
 #include "core/lens/optical_surface.h"
 #include "core/optics/optical_setup.h"
+#include "design/spline/made_by.h"
 
 namespace lensforge {
 
@@ -120,6 +121,11 @@ bool cuts_outline(const CamOptions& options, const OpticalSetup& setup);
 /// @throw InputError naming option, value and rule if an option breaks its rule on its own or
 ///        against the size of the lens.
 void validate(const CamOptions& options, const OpticalSetup& setup);
+
+/// The process that a design shapes a part for: the finishing ball's passes and the polish, of a
+/// mould those of its cast. The slopes that a scallop's pitch depends on are not known before the
+/// design. @param robust  two parts, polished less and more by Tolerances::polish_sigma.
+MadeBy made_by(const CamOptions& options, bool robust);
 
 /// Names in plain words: "top of the blank".
 const char* words_for(ZZero zero);

@@ -54,26 +54,6 @@ double order_angle(double wavelength, const Passes& passes) {
   return kOrderWidth * wavelength / passes.pitch;
 }
 
-/// Blurs of the light, of the polish, which moves the picture's detail like the lens's, and of the
-/// ripple that polish leaves of the rows: twice as far as its steepest slope moves a ray. Of a
-/// parabola's p²/(8 R) the ripple's amplitude is p²/(2π² R).
-std::vector<PictureBlur> blurs_of(const OpticalSetup& setup, const CamOptions& options,
-                                  const Passes& passes, double height, double wavelength) {
-  std::vector<PictureBlur> blurs = light_blurs(setup, height, wavelength);
-  const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
-  const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();
-  const PolishModel& polish = options.workshop.polish;
-  blurs.push_back({"polish", kGaussianWidth * polish.sigma * enlarged / pixel.minCoeff()});
-  constexpr double kPi = std::numbers::pi;
-  const double k = 2.0 * kPi / passes.pitch;
-  const double amplitude = passes.pitch * passes.pitch /
-                           (2.0 * kPi * kPi * finishing_ball(options).radius()) *
-                           transfer_of(polish).at(k);
-  const double moved = LightPath(setup).reach(2.0 * k * amplitude, height);
-  blurs.push_back({"pitch", moved / pixel.minCoeff()});
-  return blurs;
-}
-
 /// nm, for the light that a roughness which is not stated might scatter.
 constexpr double kExampleRoughness = 10.0;
 
@@ -137,6 +117,25 @@ LeakMap leak_map(const LeakageChain& chain, const Prediction& prediction,
 
 }  // namespace
 
+std::vector<PictureBlur> part_blurs(const OpticalSetup& setup, const CamOptions& options,
+                                    const Passes& passes, double height, double wavelength) {
+  std::vector<PictureBlur> blurs = light_blurs(setup, height, wavelength);
+  const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
+  const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();
+  const PolishModel& polish = options.workshop.polish;
+  blurs.push_back({"polish", kGaussianWidth * polish.sigma * enlarged / pixel.minCoeff()});
+  // The ripple reaches twice as far as its steepest slope moves a ray. Of a parabola's p²/(8 R) its
+  // amplitude is p²/(2π² R).
+  constexpr double kPi = std::numbers::pi;
+  const double k = 2.0 * kPi / passes.pitch;
+  const double amplitude = passes.pitch * passes.pitch /
+                           (2.0 * kPi * kPi * finishing_ball(options).radius()) *
+                           transfer_of(polish).at(k);
+  const double moved = LightPath(setup).reach(2.0 * k * amplitude, height);
+  blurs.push_back({"pitch", moved / pixel.minCoeff()});
+  return blurs;
+}
+
 Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const Executor& executor,
                         const RunControl& control) {
   const Lens& lens = *cut.lens;
@@ -175,7 +174,7 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
   const LightChoice light = light_choice(setup, options.light, cut.is_creased(), wavelength);
   result.light_words = light.words;
-  result.blurs = blurs_of(lens.setup, options, passes, setup.surface_height, wavelength);
+  result.blurs = part_blurs(lens.setup, options, passes, setup.surface_height, wavelength);
   LeakageChain places_chain = chain;
   if (light.waves) {
     LeakageChain by_waves = surfaces.short_chain();

@@ -116,6 +116,12 @@ class TrialCut {
 void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
                   const RunControl& control);
 
+/// Blurs of the light, of the polish, which moves the picture's detail like the lens's, and of the
+/// ripple that polish leaves of the rows, by rays.
+/// @param height  of the surface, about, mm. @param wavelength  mm
+std::vector<PictureBlur> part_blurs(const OpticalSetup& setup, const CamOptions& options,
+                                    const Passes& passes, double height, double wavelength);
+
 /// Predicts the picture of a lens from the surfaces of its cut, with the remedies and tolerances
 /// that its options request. @throw Interrupted
 Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const CutSurfaces& cut,

@@ -34,13 +34,8 @@ struct Free {
   }
 };
 
-/// Without white space and quotes around it.
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kAround = " \t\r\n\"'";
-  const std::size_t begin = text.find_first_not_of(kAround);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kAround) - begin + 1);
-}
+/// White space and quotes.
+constexpr std::string_view kAround = " \t\r\n\"'";
 
 constexpr std::string_view kData = "data:";
 constexpr std::string_view kBase64 = ";base64";
@@ -223,7 +218,7 @@ std::vector<std::string> families_in(std::string_view list) {
   std::vector<std::string> families;
   while (!list.empty()) {
     const std::size_t comma = std::min(list.find(','), list.size());
-    const std::string_view family = trimmed(list.substr(0, comma));
+    const std::string_view family = trimmed(list.substr(0, comma), kAround);
     if (!family.empty()) families.emplace_back(family);
     list.remove_prefix(std::min(comma + 1, list.size()));
   }
@@ -370,8 +365,8 @@ std::vector<Declaration> declarations_in(const std::string& text) {
     // Text before a brace is a selector.
     if (colon == std::string_view::npos || (end < css.size() && css[end] == '{')) continue;
     const std::string_view value = piece.substr(colon + 1);
-    all.push_back({lower_case(std::string(trimmed(piece.substr(0, colon)))),
-                   std::string(trimmed(value.substr(0, value.find('!'))))});
+    all.push_back({lower_case(std::string(trimmed(piece.substr(0, colon), kAround))),
+                   std::string(trimmed(value.substr(0, value.find('!')), kAround))});
   }
   return all;
 }
@@ -487,7 +482,7 @@ class Survey {
     element.is_undrawn = element.is_undrawn || !is_drawn(name, space);
     if (element.is_undrawn) return;
     element.is_style = name == "style";
-    if (element.is_style) look_at_medium(trimmed(attribute("media").value_or("")));
+    if (element.is_style) look_at_medium(trimmed(attribute("media").value_or(""), kAround));
     element.is_switch = name == "switch";
     element.is_text = element.is_text || name == "text";
     look_at_attributes(element);
@@ -554,7 +549,7 @@ class Survey {
                  is_text && thing != nullptr) {
         look_at_letters(*thing, value);
       } else {
-        look_at_property({name, std::string(trimmed(value))});
+        look_at_property({name, std::string(trimmed(value, kAround))});
       }
     }
     xmlTextReaderMoveToElement(reader_);
@@ -605,7 +600,7 @@ class Survey {
     for (std::size_t at = value.find(kBefore); at != std::string_view::npos;
          at = value.find(kBefore, at + 1)) {
       const std::string_view address = value.substr(at + kBefore.size());
-      look_at_link(std::string(trimmed(address.substr(0, address.find(')')))));
+      look_at_link(std::string(trimmed(address.substr(0, address.find(')')), kAround)));
     }
   }
 
@@ -659,7 +654,7 @@ class Survey {
   }
 
   void look_at_text(const std::string& text) {
-    if (trimmed(text).empty()) return;
+    if (trimmed(text, kAround).empty()) return;
     has_text_ = true;
     fonts_.add(path_.back().families);
     if (needs_.problem.empty()) needs_.problem = fonts_.problem_of(text);

@@ -9,18 +9,9 @@
 
 #include "core/error.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
-namespace {
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
-
-}  // namespace
-
 std::vector<double> parse_numbers(std::string_view text, const std::string& name, int count) {
   const auto refuse = [&] {
     std::vector<double> example;  // Not all zero: a direction needs a length.

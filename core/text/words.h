@@ -62,6 +62,13 @@ inline std::vector<std::string_view> split(std::string_view text, char separator
   }
 }
 
+/// The text without these characters around it. @return a view of `text`.
+inline std::string_view trimmed(std::string_view text, std::string_view around = " \t\r\n") {
+  const std::size_t first = text.find_first_not_of(around);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(around) - first + 1);
+}
+
 /// The known word that was most likely meant by a mistyped one; empty if none is near.
 std::string nearest_word(const std::string& word, const std::set<std::string>& known);
 

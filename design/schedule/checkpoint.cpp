@@ -39,6 +39,7 @@ std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
 void append_light(const LightOptions& light, json& description) {
   const Description usual = description_of(LightOptions());
   for (const Field& field : description_of(light)) {
+    if (!field.left_out.empty()) continue;
     const FieldValue value = field.fingerprint();
     if (value == usual.at(field.name).fingerprint()) continue;
     description.push_back({field.name, json_of(value)});

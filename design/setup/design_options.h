@@ -40,6 +40,7 @@ enum class SourceKind { kParallel, kPoint };
 
 /// Light source, kind of surface (lens or mirror), and place of the picture.
 struct LightOptions {
+  std::string lamp;        ///< As typed, see set_lamp(); its meaning is in the fields below.
   Body body;               ///< Lens or mirror.
   double incidence = 0.0;  ///< Angle of parallel light from a mirror's z axis, degrees, in x.
   SourceKind source = SourceKind::kParallel;
@@ -47,12 +48,16 @@ struct LightOptions {
   std::string front_file;                             ///< File of a front that is a height map.
   std::shared_ptr<const HeightSpline> front_heights;  ///< Content of front_file.
   std::optional<Eigen::Vector3d> source_position;     ///< Place of a point source, mm, lens frame.
-  Emission emission = Emission::kIsotropic;           ///< Intensity of a point source.
-  double source_angle = 0.0;                          ///< Full angle of parallel light, mrad.
-  double source_size = 0.0;                           ///< Diameter of a point source, mm.
-  SourceShape source_shape;  ///< Shape of a source with an angle or a size.
-  bool fresnel = false;      ///< Count the light that a lens's faces reflect.
-  Spectrum spectrum;         ///< Colours of the light; none: DesignOptions::ior for all.
+  /// Distance of a point source from a lens's flat face, in front of its middle, mm; 0: stated by
+  /// source_position.
+  double source_distance = 0.0;
+  Emission emission = Emission::kIsotropic;  ///< Intensity of a point source.
+  double source_angle = 0.0;                 ///< Full angle of parallel light, mrad.
+  double source_size = 0.0;                  ///< Diameter of a point source, mm.
+  std::string source_picture;                ///< File with the source's shape; empty: a disc.
+  SourceShape source_shape;                  ///< Content of source_picture.
+  bool fresnel = false;                      ///< Count the light that a lens's faces reflect.
+  Spectrum spectrum;  ///< Colours of the light; none: DesignOptions::ior for all.
   /// What the last steps of a spline follow: rays, or the picture of a wave.
   LightModel model = LightModel::kRays;
   double wavelength_nm = 550.0;  ///< Of waves, without a spectrum.
@@ -84,6 +89,7 @@ inline constexpr double kMaxWeight = 1e12;
 struct DesignOptions {
   double width = 100.0;         ///< Lens width, mm; the height follows the picture.
   double focal_length = 300.0;  ///< z of the receiving plane, mm, > thickness.
+  std::string material;         ///< As typed, see set_material().
   double ior = 1.49;            ///< Refractive index, > 1.
   double thickness = 5.0;       ///< Minimum z of the finished surface, mm, > 0.
   LightOptions light;           ///< Source, mirror or lens, screen.
@@ -158,6 +164,13 @@ bool follows_waves(const DesignOptions& options, const OpticalSetup& setup);
 
 /// The waves of a design.
 WaveOptions wave_options(const DesignOptions& options, const OpticalSetup& setup);
+
+/// Extent of the options' source.
+SourceExtent source_extent(const LightOptions& light);
+
+/// The place of a point source before a lens of this size, mm; none if none is stated.
+std::optional<Eigen::Vector3d> place_of_source(const LightOptions& light,
+                                               const Eigen::Vector2d& size);
 
 /// The same setup with the picture's centre moved along that light to another z.
 OpticalSetup at_focal_length(OpticalSetup setup, double focal_length, double thickness);

@@ -87,12 +87,6 @@ bool allows(const OpticalSetup& setup, double thickness) {
   return source_blur(setup, thickness) <= kMaxBlur * setup.pixels.minCoeff();
 }
 
-/// Extent of the options' source. @pre require_source_options().
-SourceExtent source_extent(const LightOptions& light) {
-  const bool point = light.source == SourceKind::kPoint;
-  return {point ? light.source_size : kMilliradian * light.source_angle, light.source_shape};
-}
-
 /// @throw InputError if angle, size and shape do not fit each other or the source.
 void require_source_options(const LightOptions& light) {
   if (light.source_angle > 0.0 && light.source_size > 0.0) {
@@ -230,14 +224,26 @@ Eigen::Vector2d lens_size(const DesignOptions& o, const Eigen::Vector2i& pixels)
   return {o.width, o.width * pixels.y() / pixels.x()};
 }
 
+/// The place as an option.
+std::string place_text(const LightOptions& light) {
+  if (light.source_distance > 0.0) {
+    return "--source-distance " + number_text(light.source_distance);
+  }
+  return "--source-position " + text_of(*light.source_position);
+}
+
 void require_point(const DesignOptions& o, const Eigen::Vector2d& size) {
   const std::string usual = "--source-position " + usual_position(o, size) + " works";
-  if (!o.light.source_position) refuse("--source point", "needs a place; " + usual);
-  const std::string given = "--source-position " + text_of(*o.light.source_position);
-  if (!(o.light.source_position->cwiseAbs().maxCoeff() <= kMaxFocalLength)) {
+  const std::optional<Eigen::Vector3d> place = place_of_source(o.light, size);
+  if (!place) refuse("--source point", "needs a place; " + usual);
+  const std::string given = place_text(o.light);
+  if (o.light.source_distance > 0.0 && o.light.source_position) {
+    refuse(given, "cannot be given with --source-position; leave one out");
+  }
+  if (!(place->cwiseAbs().maxCoeff() <= kMaxFocalLength)) {
     refuse(given, "must be at most " + number_text(kMaxFocalLength) + " mm away; " + usual);
   }
-  const double z = o.light.source_position->z();
+  const double z = place->z();
   const bool above = traits(o.light.body).lit_from_above;
   if (!above && !(z <= -kMinThickness)) {
     refuse(given,
@@ -263,8 +269,8 @@ void require_source(const DesignOptions& o, const Eigen::Vector2d& size) {
     refuse("--incidence " + number_text(o.light.incidence), "needs --mode reflect, or must be 0");
   }
   if (o.light.source == SourceKind::kPoint) return require_point(o, size);
-  if (o.light.source_position) {
-    refuse("--source-position " + text_of(*o.light.source_position), "needs --source point");
+  if (o.light.source_position || o.light.source_distance > 0.0) {
+    refuse(place_text(o.light), "needs --source point");
   }
   if (o.light.emission != Emission::kIsotropic) {
     refuse("--emission lambertian", "needs --source point");
@@ -305,11 +311,11 @@ std::string working_front(const DesignOptions& o, const Eigen::Vector2i& pixels,
 void require_source_outside(const DesignOptions& o, const OpticalSetup& setup) {
   if (o.light.source != SourceKind::kPoint) return;
   const FrontSurface front(*setup.front);
-  const Eigen::Vector3d& from = *o.light.source_position;
+  const Eigen::Vector3d from = place_of_source(o.light, setup.lens_size).value();
   const Eigen::AlignedBox2d plan(Eigen::Vector2d(0.0, 0.0), setup.lens_size);
   if (!plan.contains(from.head<2>()) || from.z() < front.height(from.head<2>())) return;
   refuse(
-      "--source-position " + text_of(from),
+      place_text(o.light),
       "lies inside the part, whose front is at z = " + number_text(front.height(from.head<2>())) +
           " there; --source-position " + usual_position(o, setup.lens_size) + " works");
 }
@@ -384,7 +390,7 @@ void require_picture(const DesignOptions& o) {
 /// @throw InputError if the spectrum does not fit the other options.
 void require_spectrum(const DesignOptions& o) {
   const Spectrum& spectrum = o.light.spectrum;
-  if (spectrum.none() && spectrum.abbe != Spectrum{}.abbe) {
+  if (spectrum.none() && o.material.empty() && spectrum.abbe != Spectrum{}.abbe) {
     refuse("--abbe " + number_text(spectrum.abbe),
            "needs --wavelengths; --wavelengths 450,550,650 works");
   }
@@ -518,7 +524,7 @@ void require_unshaded(const DesignOptions& o, const Eigen::Vector2i& pixels,
                       const OpticalSetup& setup) {
   if (!traits(o.light.body).lit_from_above || !is_shaded(setup, o.thickness)) return;
   const std::string given = o.light.source == SourceKind::kPoint
-                                ? "--source-position " + text_of(*o.light.source_position)
+                                ? place_text(o.light)
                                 : "--incidence " + number_text(o.light.incidence);
   const std::string free = free_light(o, pixels);
   refuse(given, "the screen is in the way of the light that comes to the mirror; " +
@@ -526,6 +532,17 @@ void require_unshaded(const DesignOptions& o, const Eigen::Vector2i& pixels,
 }
 
 }  // namespace
+
+SourceExtent source_extent(const LightOptions& light) {
+  const bool point = light.source == SourceKind::kPoint;
+  return {point ? light.source_size : kMilliradian * light.source_angle, light.source_shape};
+}
+
+std::optional<Eigen::Vector3d> place_of_source(const LightOptions& light,
+                                               const Eigen::Vector2d& size) {
+  if (light.source_distance == 0.0) return light.source_position;
+  return Eigen::Vector3d(0.5 * size.x(), 0.5 * size.y(), -light.source_distance);
+}
 
 SourceShape shape_of(const Image& picture) {
   const int longer = std::max(picture.columns(), picture.rows());
@@ -575,7 +592,8 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
     setup.front = HeightFront{options.light.front_heights, setup.lens_size};
   }
   if (options.light.source == SourceKind::kPoint) {
-    setup.lamp = PointSource{options.light.source_position.value(), options.light.emission};
+    setup.lamp = PointSource{place_of_source(options.light, setup.lens_size).value(),
+                             options.light.emission};
   } else if (traits(setup.body).lit_from_above) {
     const double angle = options.light.incidence * kDegree;
     setup.lamp = ParallelLight{{std::sin(angle), 0.0, -std::cos(angle)}};

@@ -7,12 +7,14 @@
 
 #include "core/image/color.h"
 #include "core/image/image_io.h"
+#include "core/optics/material.h"
 #include "core/optics/optical_setup.h"
 #include "core/text/number_text.h"
 #include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"
+#include "design/setup/lamps.h"
 
 namespace lensforge {
 namespace {
@@ -45,6 +47,33 @@ void describe_source_position(Description& d, std::optional<Eigen::Vector3d>& po
         const std::vector<double> numbers = parse_numbers(text, kName, 3);
         position = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]);
       });
+}
+
+constexpr const char* kStored = "the options that it stands for are stored";
+
+/// Options that stand for others; those that follow win over them.
+void describe_lamp(Description& d, LightOptions& light) {
+  Field& lamp = d.text(
+      {.name = "--lamp",
+       .help = "what lights the lens, instead of --source and its options: the sun; an LED, its "
+               "diameter and distance; a telephone's torch, as led:2mm@1m; a widened laser beam; a "
+               "projector, as led:12mm@2m; or a picture of the lamp with its width, as "
+               "lamp.png:9.3mrad or lamp.png:3mm@600mm",
+       .unit = kLampWords},
+      [&light] { return light.lamp; },
+      [&light](const std::string& text) { set_lamp(light, text); });
+  lamp.essential = true;
+  lamp.left_out = kStored;
+}
+
+FieldSpec material_spec() {
+  return {.name = "--material",
+          .help =
+              "what the lens is made of, instead of --ior and --abbe; or a file of lines "
+              "\"wavelength in µm,index\"",
+          .unit = joined(material_names(), "|") + "|FILE",
+          .essential = true,
+          .left_out = kStored};
 }
 
 void describe_wavelengths(Description& d, Spectrum& spectrum) {
@@ -94,6 +123,10 @@ void describe_front(Description& d, LightOptions& o) {
 }  // namespace
 
 void describe(Description& d, DesignOptions& o) {
+  describe_lamp(d, o.light);
+  d.text(
+      material_spec(), [&o] { return o.material; },
+      [&o](const std::string& text) { set_material(o, text); });
   d.length("--width", o.width, Limits::between(kMinLensWidth, kMaxLensWidth),
            "lens width; the height follows the picture")
       .essential = true;
@@ -146,6 +179,9 @@ void describe(Description& d, LightOptions& o) {
   d.word("--source", o.source, {{"parallel", SourceKind::kParallel}, {"point", SourceKind::kPoint}},
          "parallel light, or light from a point");
   describe_source_position(d, o.source_position);
+  d.length("--source-distance", o.source_distance, Limits::zero_or(kMinThickness, kMaxFocalLength),
+           "instead: the point source lies this far from a lens's flat face, in front of its "
+           "middle");
   d.word("--emission", o.emission, named_emissions(),
          "intensity of a point source: the same in all directions, or that of a flat LED which "
          "points to the middle of the lens");
@@ -154,6 +190,10 @@ void describe(Description& d, LightOptions& o) {
            "full angle of a lamp that sends nearly parallel light, as the sun's 9.3; 0 is none");
   d.length("--source-size", o.source_size, Limits::zero_or(kMinSourceWidth, kMaxSourceSize),
            "diameter of the lamp at --source-position; 0 is a point");
+  d.text("--source-picture", o.source_picture, "FILE",
+         "picture of the lamp as seen from the lens, as wide as --source-angle or "
+         "--source-size; without it the lamp is an evenly lit disc")
+      .left_out = "the shape that it shows is stored";
   describe_front(d, o);
   d.flag("--fresnel", o.fresnel,
          "count the light that a lens's two faces reflect, without coating: what slopes steeply "
@@ -241,6 +281,17 @@ void describe_colours(Description& d, Spectrum& spectrum) {
 }  // namespace
 
 void describe(Description& d, RenderOptions& o) {
+  describe_lamp(d, o.light);
+  d.text(
+      material_spec(), [&o] { return o.material; },
+      [&o](const std::string& text) {
+        DesignOptions stated;
+        stated.light = o.light;
+        set_material(stated, text);
+        o.material = text;
+        o.setup.ior = stated.ior;
+        o.setup.spectrum.abbe = stated.light.spectrum.abbe;
+      });
   d.word("--model", o.model, named_models(),
          "surface model of the picture; a lens has its own default, a solid is smooth");
   d.length("--focal", o.setup.focal_length, Limits::above(0, kMaxFocalLength),

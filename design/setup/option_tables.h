@@ -21,7 +21,9 @@ void describe(Description& d, ObjectiveWeights& w);
 /// Options of a rendering.
 struct RenderOptions {
   SurfaceModel model = SurfaceModel::kFacet;
-  OpticalSetup setup;  ///< With a spectrum the picture is in colour.
+  OpticalSetup setup;         ///< With a spectrum the picture is in colour.
+  LightOptions light = {};    ///< Of --lamp, for put_lamp().
+  std::string material = {};  ///< As typed; its meaning is in the setup.
 };
 
 /// Every option of a rendering, to be set in this order: setting the picture's width keeps its

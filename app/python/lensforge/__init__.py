@@ -2,7 +2,19 @@
 """From a picture to the milled lens that projects it."""
 
 from ._errors import InputError, MissingFileError, RunError
-from ._functions import batch, cam, coupon, design, export, info, nest, reflect, render, view
+from ._functions import (
+    batch,
+    cam,
+    coupon,
+    design,
+    export,
+    info,
+    nest,
+    plan,
+    reflect,
+    render,
+    view,
+)
 from ._lens import Lens, Setup, flux_image, flux_image_vjp
 from ._lensforge import __version__
 
@@ -22,6 +34,7 @@ __all__ = [
     "flux_image_vjp",
     "info",
     "nest",
+    "plan",
     "reflect",
     "render",
     "view",

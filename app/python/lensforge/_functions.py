@@ -90,6 +90,17 @@ def export(lens, out, *, progress=None, **options):
         return _lensforge.export(_folder(lens), path_of(out), options, told)
 
 
+@with_options("plan")
+def plan(picture, *, progress=None, **options):
+    """Proposes sizes for a lens from what is known of picture, lamp, wall and workshop.
+
+    picture: a path; progress: as in design(). Returns a dict with "proposals", each with sizes, what
+    to expect, and the commands that make it. The options are those of lensforge plan:
+    """
+    with function_of(progress) as told:
+        return _lensforge.plan({"PICTURE": path_of(picture)}, options, told)
+
+
 @with_options("view")
 def view(lens, out, *, progress=None, **options):
     """Writes a page that draws a lens's light and lets one change it.

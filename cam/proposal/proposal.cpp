@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/proposal/proposal.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "cam/leakage/leakage.h"
+#include "cam/plan/finishing.h"
+#include "cam/predict/prediction.h"
+#include "core/error.h"
+#include "core/image/color.h"
+#include "core/image/rasters.h"
+#include "core/optics/picture_blur.h"
+#include "core/optics/polish_transfer.h"
+#include "core/text/number_text.h"
+#include "core/text/words.h"
+#include "design/render/source_picture.h"
+#include "design/schedule/levels.h"
+#include "design/waves/wave_picture.h"
+
+namespace lensforge {
+namespace {
+
+constexpr int kTrialPixels = 64;
+constexpr int kMaxPixels = 512;
+/// Fewer are a logo's; a proposal below says so.
+constexpr int kFewPixels = 16;
+
+/// From a trial's MAE to that of N pixels, fitted to cuts of five pictures at 128² and one at 256²
+/// (docs/accuracy.md, "Plans"): the rim's share falls as the pixels grow, and pictures have less
+/// detail per pixel, by which a blur of one pixel changes them.
+constexpr double kRimPower = -0.2;
+constexpr double kDetailPower = 0.55;
+/// Passes and their rounding, which the trial leaves out, add this to the MAE of the polish.
+constexpr double kPasses = 1.05;
+
+/// Of a lens whose surface is not known yet, in its widths: between a photograph's 0.12 on a wall
+/// at three widths and a drawing's 0.05.
+constexpr double kUsualRelief = 0.1;
+
+constexpr double kUsualWidth = 100.0;  ///< mm
+constexpr double kMinWidth = 10.0;     ///< mm
+
+double rough_length(const CamOptions& options, const Eigen::Vector2d& size, double relief,
+                    double mean) {
+  const RoughProcess& rough = options.workshop.process.rough;
+  const Stock& stock = options.workshop.stock;
+  const Eigen::Vector2d blank = size.array() + 2.0 * stock.margin;
+  const double deep = relief + stock.allowance - rough.allowance;
+  if (deep <= 0.0) return 0.0;
+  const double levels = std::max(1.0, std::ceil(deep / rough.stepdown));
+  // The mean depth of material over the levels' distance: the number of levels that pass a place.
+  const double passed = (relief - mean + stock.allowance) / (deep / levels);
+  return blank.prod() / rough.stepover * std::min(passed, levels);
+}
+
+/// @param beyond  how far passes go over the rectangle on every side, mm.
+double raster_length(const Eigen::Vector2d& size, double beyond, double stepover, PassAxis along) {
+  const Eigen::Vector2d whole = size.array() + 2.0 * beyond;
+  const double length = along == PassAxis::kX ? whole.x() : whole.y();
+  const double across = along == PassAxis::kX ? whole.y() : whole.x();
+  return length * (std::ceil(across / stepover) + 1.0);
+}
+
+Eigen::Vector2d size_of(const DesignOptions& design, const Eigen::Vector2i& picture) {
+  return {design.width, design.width * picture.y() / picture.x()};
+}
+
+Eigen::Vector2i pixels_of(const Eigen::Vector2i& picture, int longer) {
+  return working_size(picture.x(), picture.y(), longer);
+}
+
+double total(const std::vector<OperationMinutes>& operations) {
+  return std::accumulate(operations.begin(), operations.end(), 0.0,
+                         [](double sum, const OperationMinutes& one) { return sum + one.minutes; });
+}
+
+constexpr double kMinutesPerHour = 60.0;
+
+/// The widest lens, in whole mm, that the hours and the machine's travel allow.
+double width_within(const ProposalWish& wish, const Eigen::Vector2i& picture) {
+  const Eigen::Vector3d& travel = wish.cut.workshop.machine.travel;
+  const double beside = 2.0 * (wish.cut.workshop.stock.margin + kMinWidth);
+  const auto fits = [&](double width) {
+    const Eigen::Vector2d size(width, width * picture.y() / picture.x());
+    const double relief = kUsualRelief * width;
+    return size.x() + beside <= travel.x() && size.y() + beside <= travel.y() &&
+           total(operation_times(wish.cut, size, relief, 0.5 * relief)) <=
+               kMinutesPerHour * wish.hours;
+  };
+  double width = wish.design.light.image_width > 0.0
+                     ? std::min(kUsualWidth, wish.design.light.image_width)
+                     : kUsualWidth;
+  width = std::max(kMinWidth, std::floor(width));
+  while (width > kMinWidth && !fits(width)) width -= 1.0;
+  return width;
+}
+
+std::vector<PictureBlur> blurs_of(const ProposalWish& wish, const OpticalSetup& setup) {
+  const Passes passes = passes_on_lens(wish.cut, unknown_ground(wish.cut, setup));
+  const double wavelength = middle_wavelength(setup, kMmPerNm * wish.design.light.wavelength_nm);
+  return part_blurs(setup, wish.cut, passes, wish.design.thickness, wavelength);
+}
+
+/// The same wish with widths and pixels chosen where they are not stated.
+ProposalWish completed(ProposalWish wish, const Eigen::Vector2i& picture) {
+  if (!wish.sized) wish.design.width = width_within(wish, picture);
+  if (!wish.pixelled) {
+    // Even, so that halves of it are whole.
+    const int sharp = sharp_pixels(wish, picture) / 2 * 2;
+    wish.design.pixels = std::clamp(sharp, kFewPixels, std::min(kMaxPixels, picture.maxCoeff()));
+  }
+  return wish;
+}
+
+/// The design of a part of the wall: `share` of its pixels at their size.
+DesignOptions trial_of(const DesignOptions& design, int pixels) {
+  const double share = static_cast<double>(pixels) / design.pixels;
+  DesignOptions trial = design;
+  trial.pixels = pixels;
+  trial.width *= share;
+  trial.light.image_width *= share;
+  trial.light.image_offset *= share;
+  trial.checkpoint.clear();
+  // Half of the time, and an MAE that is 0.0007 (portrait) to 0.0027 (logo) higher by rays.
+  trial.rounds = std::min(trial.rounds, 3);
+  // What the lamp's extent adds is limit_of(): a trial with it takes ten times as long.
+  trial.light.source_angle = trial.light.source_size = 0.0;
+  trial.light.source_shape = {};
+  return trial;
+}
+
+/// The picture, mirrored at its edges, blurred along one axis by a Gaussian as wide as a pixel.
+Image blurred(const Image& picture, bool along_rows) {
+  constexpr int kReach = 2;  // 5 standard deviations.
+  constexpr double kSigma = 1.0 / kGaussianWidth;
+  std::array<double, 2 * kReach + 1> weights{};
+  for (int k = -kReach; k <= kReach; ++k) {
+    weights[static_cast<std::size_t>(k + kReach)] = std::exp(-0.5 * k * k / (kSigma * kSigma));
+  }
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  const auto inside = [](int k, int count) {
+    return std::clamp(k < 0 ? -1 - k : k >= count ? 2 * count - 1 - k : k, 0, count - 1);
+  };
+  Image result(picture.columns(), picture.rows());
+  for (int row = 0; row < picture.rows(); ++row) {
+    for (int column = 0; column < picture.columns(); ++column) {
+      double value = 0.0;
+      for (int k = -kReach; k <= kReach; ++k) {
+        const int x = along_rows ? inside(column + k, picture.columns()) : column;
+        const int y = along_rows ? row : inside(row + k, picture.rows());
+        value += weights[static_cast<std::size_t>(k + kReach)] * picture.at(x, y);
+      }
+      result.at(column, row) = static_cast<float>(value / sum);
+    }
+  }
+  return result;
+}
+
+/// MAE between a picture of so many pixels and the same blurred by one pixel.
+double detail_at(const Image& picture, int longer) {
+  const Eigen::Vector2i size = pixels_of({picture.columns(), picture.rows()}, longer);
+  const Image target = resample(picture, size.x(), size.y());
+  return compare(blurred(blurred(target, true), false), target).mae;
+}
+
+/// MAE of the best picture that any surface has in the light of an extended lamp; 0 for a point.
+double limit_of(const Image& picture, const DesignOptions& design, const Executor& executor) {
+  const Eigen::Vector2i pixels = pixels_of({picture.columns(), picture.rows()}, design.pixels);
+  const OpticalSetup setup = optical_setup(design, pixels);
+  if (setup.extent.none()) return 0.0;
+  const Image target = resample(picture, pixels.x(), pixels.y());
+  return source_limit(target, setup, design.thickness, executor).metrics.mae;
+}
+
+FluxPicture flux_of(const Image& image, double whole) {
+  FluxPicture picture{image.columns(), image.rows(), {}};
+  for (const float value : image.values()) picture.flux.push_back(value / whole);
+  return picture;
+}
+
+/// Forecast by a small design and the model of its process.
+ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const Executor& executor,
+                          const RunControl& control) {
+  const DesignOptions& design = wish.design;
+  const int pixels = std::min(kTrialPixels, design.pixels);
+  const DesignOptions small = trial_of(design, pixels);
+  require_light(design, pixels_of({picture.columns(), picture.rows()}, design.pixels));
+  const DesignResult trial = design_lens(picture, small, executor, control);
+  if (trial.status == DesignResult::Status::kInterrupted) throw Interrupted();
+  const Lens& lens = trial.lens;
+  const MadeBy process = made_by(wish.cut, false);
+  ProposalForecast result;
+  result.blurs = blurs_of(
+      wish, optical_setup(design, pixels_of({picture.columns(), picture.rows()}, design.pixels)));
+  result.waves = waves_show(result.blurs);
+  Image designed = lens.render;
+  Image part;
+  if (result.waves) {
+    const WaveOptions waves = wave_options(small, lens.setup);
+    designed = wall_of(lens, std::nullopt, waves, executor, control).picture;
+    part = wall_of(lens, process, waves, executor, control).picture;
+  } else {
+    part = made_part(lens, process, executor).picture;
+  }
+  const double whole = lens.target.total();
+  const FluxPicture reference = flux_of(designed, whole);
+  const PictureQuality quality =
+      PictureJudge(lens.target, reference, wish.cut.leakage).judge(flux_of(part, whole));
+  const double grown = static_cast<double>(design.pixels) / pixels;
+  const double detail = detail_at(picture, pixels);
+  const double share = detail > 0.0 ? detail_at(picture, design.pixels) / detail : 1.0;
+  const double scale = std::pow(grown, kRimPower) * std::pow(share, kDetailPower);
+  result.mae = kPasses * scale * quality.metrics.mae + limit_of(picture, design, executor);
+  result.leakage = scale * quality.leakage;
+  const double contrast = quality.contrast();
+  result.contrast = std::isfinite(contrast) ? contrast : 0.0;
+  const Eigen::VectorXd heights = lens.surface.vertices.row(2);
+  const double scaled = grown * grown;
+  result.relief = scaled * (heights.maxCoeff() - heights.minCoeff());
+  const double mean = scaled * (heights.mean() - heights.minCoeff());
+  const Eigen::Vector2d size = size_of(design, {picture.columns(), picture.rows()});
+  result.operations = operation_times(wish.cut, size, result.relief, mean);
+  const double needed = design.thickness + result.relief;
+  for (const double sheet : wish.sheets) {
+    if (sheet >= needed && (result.sheet == 0.0 || sheet < result.sheet)) result.sheet = sheet;
+  }
+  const Eigen::Vector2i all = pixels_of({picture.columns(), picture.rows()}, design.pixels);
+  result.design_seconds = estimate_design(all.x(), all.y(), design, executor.concurrency()).seconds;
+  result.sharp_pixels = sharp_pixels(wish, {picture.columns(), picture.rows()});
+  return result;
+}
+
+/// A wish that shows more pixels, and how; none if nothing changes them.
+std::optional<std::pair<ProposalWish, std::string>> sharper(const ProposalWish& asked,
+                                                            const Eigen::Vector2i& picture) {
+  ProposalWish other = asked;
+  other.pixelled = false;
+  other.sized = true;
+  const double nearest =
+      1.5 * std::max(size_of(asked.design, picture).maxCoeff(), asked.design.light.image_width);
+  if (0.5 * asked.design.focal_length >= nearest) {
+    other.design.focal_length *= 0.5;
+    return std::pair{completed(std::move(other), picture),
+                     "a wall at " + number_text(0.5 * asked.design.focal_length) +
+                         " mm instead of " + number_text(asked.design.focal_length)};
+  }
+  const double wide =
+      asked.design.light.image_width > 0.0 ? asked.design.light.image_width : asked.design.width;
+  other.design.light.image_width = 2.0 * wide;
+  return std::pair{
+      completed(std::move(other), picture),
+      "a picture " + number_text(2.0 * wide) + " mm wide instead of " + number_text(wide)};
+}
+
+/// A wish that takes a quarter of the time.
+ProposalWish quicker(const ProposalWish& asked, const Eigen::Vector2i& picture) {
+  ProposalWish other = asked;
+  other.sized = true;
+  other.pixelled = false;
+  other.design.width *= 0.5;
+  other.design.focal_length *= 0.5;
+  other.design.light.image_width *= 0.5;
+  return completed(std::move(other), picture);
+}
+
+}  // namespace
+
+double ProposalForecast::minutes() const { return total(operations); }
+
+int sharp_pixels(const ProposalWish& wish, const Eigen::Vector2i& picture) {
+  DesignOptions design = wish.design;
+  design.pixels = kTrialPixels;
+  const Eigen::Vector2i pixels = pixels_of(picture, kTrialPixels);
+  const std::vector<PictureBlur> blurs = blurs_of(wish, optical_setup(design, pixels));
+  double widest_blur = 0.0;
+  // Ripples of the rows are not of the picture: they do not limit its pixels.
+  for (const PictureBlur& blur : blurs) {
+    if (blur.cause != "pitch") widest_blur = std::max(widest_blur, blur.pixels);
+  }
+  if (widest_blur == 0.0) return kMaxPixels;
+  return static_cast<int>(std::min(1e6, pixels.maxCoeff() / widest_blur));
+}
+
+std::vector<OperationMinutes> operation_times(const CamOptions& options,
+                                              const Eigen::Vector2d& size, double relief,
+                                              double mean) {
+  const Workshop& shop = options.workshop;
+  const Process& process = shop.process;
+  const double apron = apron_to_cut(options);
+  std::vector<OperationMinutes> operations;
+  const auto add = [&](const char* name, int tool, double length) {
+    operations.push_back({name, kOperationMinutes + length / shop.tool(tool).feed});
+  };
+  if (process.rough.enabled) {
+    add("rough", process.rough.tool, rough_length(options, size, relief, mean));
+  }
+  // Passes end a radius beyond what they cut.
+  const auto raster = [&](const char* name, int tool, double stepover, PassAxis along) {
+    const double beyond = apron + shop.tool(tool).radius();
+    add(name, tool, raster_length(size, beyond, stepover, along));
+  };
+  if (process.semi.enabled) {
+    raster("semi", process.semi.tool, process.semi.stepover, process.semi.along);
+  }
+  const FinishProcess& finish = process.finish;
+  const double pitch = max_pitch(finish, shop.tool(finish.tool).radius(), kUnknownSlope);
+  raster("finish", finish.tool, pitch, finish.along);
+  if (finish.cross) {
+    raster("cross", finish.tool, pitch, finish.along == PassAxis::kX ? PassAxis::kY : PassAxis::kX);
+  }
+  return operations;
+}
+
+std::vector<Proposal> propose(const Image& picture, const ProposalWish& wish,
+                              const Executor& executor, const RunControl& control) {
+  const Eigen::Vector2i size(picture.columns(), picture.rows());
+  const ProposalWish asked = completed(wish, size);
+  std::vector<std::pair<ProposalWish, std::array<std::string, 2>>> wishes;
+  wishes.push_back({asked, {"as asked", ""}});
+  if (auto other = sharper(asked, size)) {
+    wishes.push_back({std::move(other->first), {"sharper", std::move(other->second)}});
+  }
+  const double relief = kUsualRelief * asked.design.width;
+  const double minutes =
+      total(operation_times(asked.cut, size_of(asked.design, size), relief, 0.5 * relief));
+  if (minutes > kMinutesPerHour && 0.5 * asked.design.width >= kMinWidth) {
+    wishes.push_back({quicker(asked, size), {"quicker", "everything half as large"}});
+  }
+  std::vector<Proposal> proposals;
+  for (auto& [one, words] : wishes) {
+    validate(one.design, picture);
+    proposals.push_back(
+        {words[0], words[1], one.design, forecast(picture, one, executor, control)});
+  }
+  return proposals;
+}
+
+}  // namespace lensforge

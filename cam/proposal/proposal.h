@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cam/plan/cam_options.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/optics/optical_setup.h"
+#include "design/design.h"
+
+/// Proposes sizes for a lens from what a person knows (lamp, wall, workshop), and forecasts what
+/// comes of each.
+namespace lensforge {
+
+/// What is known of a lens. Lamp, material and distance of the wall are those of `design`.
+struct ProposalWish {
+  DesignOptions design;
+  bool sized = false;     ///< design.width is stated.
+  bool pixelled = false;  ///< design.pixels is stated.
+  CamOptions cut;         ///< Workshop and part.
+  double hours = 8.0;     ///< On the machine at most, > 0.
+  std::vector<double> sheets = {2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30};  ///< Thicknesses, mm.
+};
+
+/// Duration of one operation of a cut.
+struct OperationMinutes {
+  std::string name;  ///< "rough", "semi", "finish"
+  double minutes = 0.0;
+};
+
+/// What comes of a design that is cut and polished. Its numbers follow from a trial of at most 64
+/// pixels with pixels of the same size, and are good to those stated in docs/accuracy.md, "Plans".
+struct ProposalForecast {
+  std::vector<PictureBlur> blurs;  ///< part_blurs()
+  int sharp_pixels = 0;   ///< On the picture's longer side, each as wide as the widest blur.
+  bool waves = false;     ///< The picture is by waves; else by rays.
+  double mae = 0.0;       ///< Of the part.
+  double leakage = 0.0;   ///< PictureQuality::leakage of the part.
+  double contrast = 0.0;  ///< PictureQuality::contrast() of the part; 0 for a picture without dark.
+  double relief = 0.0;    ///< Highest − lowest point of the surface, mm.
+  double sheet = 0.0;     ///< Thinnest of ProposalWish::sheets that fits; 0 if none does.
+  std::vector<OperationMinutes> operations;
+  double design_seconds = 0.0;  ///< estimate_design()
+
+  [[nodiscard]] double minutes() const;
+};
+
+/// A proposal: sizes and what comes of them.
+struct Proposal {
+  std::string title;  ///< "as asked", "sharper", "quicker"
+  std::string words;  ///< What it does, in a sentence.
+  DesignOptions design;
+  ProposalForecast forecast;
+};
+
+/// Pixels on the picture's longer side that light, polish and passes show: each as wide as the
+/// widest blur. @param picture  size of the picture, pixels.
+int sharp_pixels(const ProposalWish& wish, const Eigen::Vector2i& picture);
+
+/// Durations of a cut's operations: length of their passes over feed, and kOperationMinutes.
+/// @param size  of the lens, mm. @param relief, mean  highest and mean height of the surface above
+///                 its lowest point, mm.
+std::vector<OperationMinutes> operation_times(const CamOptions& options,
+                                              const Eigen::Vector2d& size, double relief,
+                                              double mean);
+
+/// Start and end of an operation: spindle, first approach, retreat.
+inline constexpr double kOperationMinutes = 0.6;
+
+/// The proposal that keeps to what is stated, then up to two others: sharper and quicker.
+/// @throw InputError naming option, value and rule if the options contradict each other;
+///        Interrupted.
+std::vector<Proposal> propose(const Image& picture, const ProposalWish& wish,
+                              const Executor& executor, const RunControl& control);
+
+}  // namespace lensforge
