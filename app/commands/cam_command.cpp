@@ -23,6 +23,7 @@
 #include "core/io/lens_folder.h"
 #include "core/schema/description.h"
 #include "core/schema/toml_document.h"
+#include "core/text/words.h"
 #include "machine/gcode.h"
 
 namespace lensforge::app {
@@ -52,6 +53,7 @@ void describe(Description& d, CamSettings& settings) {
 void take_workshop(OptionSet& options, const std::string& file, CamOptions& cam) {
   if (file.empty()) return;
   cam.workshop = read_workshop(file);
+  cam.post = post_of(cam.workshop, file);
   options.restate();
 }
 
@@ -84,10 +86,15 @@ std::string z_text(double z_offset) {
 std::string next_step(const fs::path& page, const JobResult& job, const CamOptions& cam,
                       int missed) {
   std::string note = "look at " + page.string();
+  if (missed > 0 || job.files.empty()) return note;
   const std::string& dialect = cam.post.reader.name;
   const bool sendable = dialect == grbl_dialect().name || dialect == grblhal_dialect().name;
-  if (!sendable || missed > 0 || job.files.empty()) return note;
-  note += "; then: lensforge send " + shell_word(job.files.front().string()) + " --dry-run";
+  const std::string program = shell_word(job.files.front().string());
+  if (!sendable) {
+    return joined({note, "; then run ", program, " first, on a machine with ", dialect,
+                   " (--post grbl makes programs for lensforge send)"});
+  }
+  note += "; then: lensforge send " + program + " --dry-run";
   // Without the option send reads programs for Grbl.
   if (dialect != grbl_dialect().name) note += " --dialect " + dialect;
   return note;
