@@ -79,9 +79,7 @@ nlohmann::json job_json(const OptionSet& options, const JobResult& result,
   return json;
 }
 
-std::string z_text(double z_offset) {
-  return "  Z         program Z = lens z + " + fixed(z_offset, 4) + " mm\n";
-}
+std::string z_text(double z_offset) { return "  Z         " + z_words(z_offset) + "\n"; }
 
 std::string next_step(const fs::path& page, const JobResult& job, const CamOptions& cam,
                       int missed) {
@@ -155,7 +153,9 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     text += surface_text(report.leakage.designed);
     for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
     text += wave_text(report);
-    for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
+    if (report.places_matter()) {
+      for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
+    }
     if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }
   return text + verdict_text(report.verdict) + z_text(report.z_offset);
