@@ -72,7 +72,7 @@ std::string leakage_figure(const LeakageResult& result) {
 }
 
 std::string signed_text(double value, int decimals) {
-  const std::string digits = decimal_text(std::abs(value), decimals);
+  std::string digits = decimal_text(std::abs(value), decimals);
   if (digits.find_first_of("123456789") == std::string::npos) return digits;
   return (value < 0.0 ? "−" : "+") + digits;
 }
@@ -183,8 +183,7 @@ std::string places(const ReportData& data) {
                        element("p", "",
                                joined({"None stands out: the ", std::to_string(data.places.size()),
                                        " worst carry ", share,
-                                       " of the leak together. “Leakage by cause” below says what "
-                                       "matters."})));
+                                       " of the leak together. See “Leakage by cause” below."})));
   }
   std::string items;
   for (const LeakPlace& place : data.places) {

@@ -98,7 +98,8 @@ void require_grbl_family(std::istream& program, const std::string& name) {
   std::string others;
   for (const GcodeDialect& other : {linuxcnc_dialect(), fanuc_dialect(), weihong_dialect()}) {
     if (first_refusal(program, other, refusal->line)) continue;
-    others = others.empty() ? other.name : others + " or " + other.name;
+    if (!others.empty()) others += " or ";
+    others += other.name;
   }
   if (others.empty()) return;
   throw OtherDialect(joined(
