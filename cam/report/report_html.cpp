@@ -114,10 +114,11 @@ std::string spread_of_parts(const ReportData& data) {
     return element("p", "", escape_html(tolerance_words(data.tolerances)));
   }
   if (data.tolerance_hint.empty()) return "";
-  return element("p", "",
-                 "This is one part without errors. What 8 of 10 parts show is predicted by " +
-                     element("code", "", escape_html(data.tolerance_hint)) +
-                     ", with the other options as now.");
+  return element(
+      "p", "",
+      "This is one part without errors. What 8 of 10 parts show is predicted by " +
+          element("code", "style=\"white-space:nowrap\"", escape_html(data.tolerance_hint)) +
+          ", with the other options as now.");
 }
 
 std::string tool_words(const Tool& tool) {

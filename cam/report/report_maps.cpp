@@ -194,7 +194,7 @@ std::string map_figure(const ReportMap& map, const ReportData& data) {
       html_scale(decimal_text(*low, decimals), decimal_text(*high, decimals) + " " + map.unit);
   const std::string caption =
       element("b", "", escape_html(map.title)) + "<br>" + escape_html(map.note) + scale;
-  return element("figure", "class=\"map\"",
+  return element("figure", "class=\"map\" style=\"max-width:34rem\"",
                  element("div", "class=\"frame\"", picture + place_rings(data)) +
                      element("figcaption", "", caption));
 }
