@@ -19,6 +19,7 @@
 #include "core/schema/description.h"
 #include "core/text/words.h"
 #include "machine/gcode/gcode_dialect.h"
+#include "machine/gcode/program_dialect.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/guard/spindle_guard.h"
 #include "machine/link/link.h"
@@ -364,6 +365,7 @@ class SendJob {
     summary_.job = program_.identity();
     watcher_.opened(summary_.job);
     check_seal_of_program();
+    require_grbl_family(*program_.open(), file_.string());
     if (options_.port.empty()) {
       examine_alone();
     } else {
@@ -433,7 +435,13 @@ class SendJob {
       if (!lack.empty()) throw InputError(file_.string() + ": " + lack);
       return facts;
     } catch (const GcodeError& refused) {
-      throw InputError(file_.string() + ": " + refused.what());
+      const std::string why = file_.string() + ": " + refused.what();
+      const std::string& wanted = options.dialect.name;
+      const std::optional<StatedDialect> stated = stated_dialect(*program_.open());
+      if (!stated || stated->name == wanted) throw InputError(why);
+      throw OtherDialect(
+          joined({why, "; line ", std::to_string(stated->line), " states the dialect ",
+                  stated->name, ", the controller's is ", wanted}));
     }
   }
 

@@ -23,6 +23,7 @@
 #include "core/io/lens_folder.h"
 #include "core/schema/description.h"
 #include "core/schema/toml_document.h"
+#include "core/text/words.h"
 #include "machine/gcode.h"
 
 namespace lensforge::app {
@@ -52,6 +53,7 @@ void describe(Description& d, CamSettings& settings) {
 void take_workshop(OptionSet& options, const std::string& file, CamOptions& cam) {
   if (file.empty()) return;
   cam.workshop = read_workshop(file);
+  cam.post = post_of(cam.workshop, file);
   options.restate();
 }
 
@@ -77,17 +79,20 @@ nlohmann::json job_json(const OptionSet& options, const JobResult& result,
   return json;
 }
 
-std::string z_text(double z_offset) {
-  return "  Z         program Z = lens z + " + fixed(z_offset, 4) + " mm\n";
-}
+std::string z_text(double z_offset) { return "  Z         " + z_words(z_offset) + "\n"; }
 
 std::string next_step(const fs::path& page, const JobResult& job, const CamOptions& cam,
                       int missed) {
   std::string note = "look at " + page.string();
+  if (missed > 0 || job.files.empty()) return note;
   const std::string& dialect = cam.post.reader.name;
   const bool sendable = dialect == grbl_dialect().name || dialect == grblhal_dialect().name;
-  if (!sendable || missed > 0 || job.files.empty()) return note;
-  note += "; then: lensforge send " + shell_word(job.files.front().string()) + " --dry-run";
+  const std::string program = shell_word(job.files.front().string());
+  if (!sendable) {
+    return joined({note, "; then run ", program, " first, on a machine with ", dialect,
+                   " (--post grbl makes programs for lensforge send)"});
+  }
+  note += "; then: lensforge send " + program + " --dry-run";
   // Without the option send reads programs for Grbl.
   if (dialect != grbl_dialect().name) note += " --dialect " + dialect;
   return note;
@@ -148,7 +153,9 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     text += surface_text(report.leakage.designed);
     for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
     text += wave_text(report);
-    for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
+    if (report.places_matter()) {
+      for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
+    }
     if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
   }
   return text + verdict_text(report.verdict) + z_text(report.z_offset);

@@ -55,8 +55,8 @@ std::string z_text(double z_offset);
 /// Returns one line for every limit that a cut misses and for every piece of advice.
 std::string verdict_text(const Verdict& verdict);
 
-/// Last note of a finished job: the page or drawing to look at. If no limit is missed, also the
-/// check of its first program, where the dialect is one that `lensforge send` takes.
+/// Last note of a finished job: the page or drawing to look at. If no limit is missed, also its
+/// first program: the command that checks it, where `lensforge send` takes the dialect.
 std::string next_step(const std::filesystem::path& page, const JobResult& job,
                       const CamOptions& cam, int missed);
 

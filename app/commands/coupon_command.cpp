@@ -31,10 +31,12 @@ void describe(Description& d, CouponSettings& settings) {
   describe(d, settings.coupon);
 }
 
-void settle(const OptionSet& options, CouponSettings& settings) {
+void settle(OptionSet& options, CouponSettings& settings) {
   if (!settings.workshop.empty()) {
     settings.workshop_text = read_toml_file(settings.workshop, "a workshop");
     settings.coupon.workshop = parse_workshop(settings.workshop_text, settings.workshop);
+    settings.coupon.post = post_of(settings.coupon.workshop, settings.workshop);
+    options.restate();
   }
   if (settings.fit.empty()) return;
   for (const Field& row : description_of(settings.coupon)) {

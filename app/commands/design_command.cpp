@@ -161,7 +161,10 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
                        model_name(settings.design.model));
     }
     settings.design.model = SurfaceModel::kSpline;
-    if (settings.made_by != "default") settings.cut.workshop = read_workshop(settings.made_by);
+    if (settings.made_by != "default") {
+      settings.cut.workshop = read_workshop(settings.made_by);
+      (void)post_of(settings.cut.workshop, settings.made_by);  // A wrong one is named before the design.
+    }
   }
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
@@ -525,8 +528,16 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
 }
 
 /// Saves the result. An earlier lens of another design stays until this one is done.
-CommandResult finish(CommandFrame& frame, const ChosenDevice& device, const DesignOptions& design,
-                     const fs::path& folder, DesignResult& result) {
+/// The command that cuts the lens, in the workshop that it was designed for.
+std::string cam_words(const DesignSettings& settings, const fs::path& folder) {
+  const bool named = !settings.made_by.empty() && settings.made_by != "default";
+  return "lensforge cam " + shell_word(folder.string()) +
+         (named ? " --workshop " + shell_word(settings.made_by) : std::string());
+}
+
+CommandResult finish(CommandFrame& frame, const ChosenDevice& device,
+                     const DesignSettings& settings, const fs::path& folder, DesignResult& result) {
+  const DesignOptions& design = settings.design;
   const bool done = result.status == DesignResult::Status::kDone;
   result.lens.provenance = design_provenance(frame.options(), device, design, result);
   const EarlierDesign earlier = EarlierDesign::in(folder);
@@ -545,7 +556,7 @@ CommandResult finish(CommandFrame& frame, const ChosenDevice& device, const Desi
   }
   if (done) {
     outcome.notes.push_back("look at " + (folder / lens_file::kOverview).string() +
-                            "; then: lensforge cam " + shell_word(folder.string()));
+                            "; then: " + cam_words(settings, folder));
   } else {
     outcome.notes.emplace_back(kContinueWithResume);
   }
@@ -652,7 +663,7 @@ CommandResult run(CommandFrame& frame, DesignSettings& settings) {
     folder.remove_partial_files(is_of_lens);
     note_begin(settings, loaded, device, console);
   });
-  return finish(frame, device, design, settings.out, result);
+  return finish(frame, device, settings, settings.out, result);
 }
 
 }  // namespace

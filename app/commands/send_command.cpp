@@ -7,9 +7,11 @@
 #include <array>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <system_error>
 
 #include "app/commands/send_watch.h"
 #include "app/frame/command_line.h"
@@ -19,12 +21,18 @@
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "app/frame/terminal_keys.h"
+#include "cam/cam.h"
+#include "cam/coupon/coupon_job.h"
 #include "core/error.h"
+#include "core/io/lens_folder.h"
 #include "core/text/words.h"
+#include "machine/gcode/program_dialect.h"
 #include "machine/link/port.h"
 #include "machine/send.h"
 
 namespace lensforge::app {
+
+namespace fs = std::filesystem;
 
 void describe(Description& d, SendSettings& settings) {
   d.text("FILE", settings.file, "", "G-code program").needed = true;
@@ -212,6 +220,30 @@ struct Operator {
   OperatorView view;
 };
 
+/// True if `folder` has a file of this name.
+bool holds(const fs::path& folder, const char* name) {
+  std::error_code unreadable;
+  return fs::is_regular_file(folder / name, unreadable);
+}
+
+/// Says how to make a program again that is written for another dialect, by the files beside it.
+std::string way_to_make(const fs::path& program, const std::string& dialect) {
+  const std::string post = " --post " + dialect;
+  const fs::path folder = program.has_parent_path() ? program.parent_path() : fs::path(".");
+  const bool named = folder.filename() == "cam";
+  const fs::path above = named ? folder.parent_path() : folder / "..";
+  const fs::path lens = above.empty() ? fs::path(".") : above;
+  const std::string others = ", with the other options that made it";
+  if (holds(folder, cam_file::kReport) && holds(lens, lens_file::kJson)) {
+    return "make it with lensforge cam " + shell_word(lens.string()) + post + others;
+  }
+  if (holds(folder, coupon_file::kSheet)) {
+    return "make it with lensforge coupon --out " + shell_word(folder.string()) + post + others;
+  }
+  const char* const command = holds(folder, nest_file::kJson) ? "nest" : "cam";
+  return joined({"make it again by lensforge ", command, " with", post});
+}
+
 /// Shows a job on the terminal and puts it on record.
 class JobConsole : public JobWatcher {
  public:
@@ -304,6 +336,11 @@ SendSummary watched_job(const OptionSet& options, const SendSettings& settings,
   try {
     return send_job(settings.file, settings.job, watcher, interrupt.token(),
                     interrupt.second_token());
+  } catch (const OtherDialect& why) {
+    const InputError full(
+        joined({why.what(), "; ", way_to_make(settings.file, settings.job.dialect)}));
+    watcher.refused(full);
+    throw full;
   } catch (const std::exception& why) {
     watcher.refused(why);
     throw;

@@ -26,7 +26,7 @@ void describe(Description& d, CouponSettings& settings);
 
 /// Reads the workshop. @throw InputError naming file or option, value and rule, also if an option
 /// of the cut is given with --fit.
-void settle(const OptionSet& options, CouponSettings& settings);
+void settle(OptionSet& options, CouponSettings& settings);
 
 /// Options of `lensforge export`.
 struct ExportSettings {

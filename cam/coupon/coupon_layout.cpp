@@ -31,7 +31,7 @@ void describe(Description& d, CouponOptions& o) {
   d.length("--depth", o.depth, Limits::between(kShallowest, kDeepest),
            "of the pads below the top of the blank");
   d.length("--thickness", o.thickness, Limits::between(kThinnest, kThickest), "of the blank");
-  describe_post(d, o.post);
+  describe_post(d, o.post, o.workshop);
   describe_spindle_start(d, o.spin_up, o.coolant);
   d.flag("--force", o.force,
          "replace files that lensforge did not write, or that were changed since");

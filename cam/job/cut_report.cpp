@@ -2,9 +2,12 @@
 #include "cam/job/cut_report.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 
 #include "cam/plan/finishing.h"
@@ -209,6 +212,60 @@ std::string length_words_of(const PostDescription& post, const ProgramFiles& pro
   return length_words(post, most, "the tool of each program");
 }
 
+/// Thicknesses in which sheets of acrylic are sold, mm.
+constexpr std::array kSheets{2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0};
+
+/// Decimals of a blank's height: nobody measures it finer.
+constexpr int kHeightDecimals = 2;
+
+/// True if the blank is cut from a sheet: one of its own, of acrylic, with a flat underside.
+bool takes_sheet(const WrittenCut& cut) {
+  const CutSetup& setup = cut.setup;
+  const std::string& material = setup.options.workshop.material.name;
+  const bool acrylic = material.find("acryl") != std::string::npos ||
+                       material.find("Acryl") != std::string::npos ||
+                       material.find("PMMA") != std::string::npos;
+  return acrylic && !cut.shared && setup.options.part == PartKind::kLens &&
+         !setup.lens->setup.front;
+}
+
+/// The thinnest sheet that is as high as the blank; 0 if none is.
+double sheet_for(double height) {
+  const auto* const found = std::find_if(kSheets.begin(), kSheets.end(),
+                                         [height](double sheet) { return sheet >= height; });
+  return found == kSheets.end() ? 0.0 : *found;
+}
+
+/// How a sheet becomes as high as the blank.
+std::string height_words(const CutSetup& setup, double sheet) {
+  const double height = setup.blank.max().z();
+  const std::string needed = mm(height, kHeightDecimals);
+  if (sheet == 0.0) {
+    return joined({"at least ", needed, ", more than sheets on sale have (",
+                   trimmed_decimal(kSheets.back(), 0), " mm): face a block to ", needed});
+  }
+  const std::string bought = trimmed_decimal(sheet, 0) + " mm";
+  const std::string fit = joined({"a sheet of ", bought, ", the next on sale above ", needed});
+  const double off = sheet - height;
+  const std::string measure = "; measure it, sheets are up to 0.4 mm and a tenth off";
+  if (off < 0.5 * std::pow(10.0, -kHeightDecimals)) return fit + measure;
+  return joined({fit, ": face its top off by ", mm(off, kHeightDecimals),
+                 ", or run cam with --stock ",
+                 trimmed_decimal(setup.options.workshop.stock.allowance + off, 3),
+                 "mm, whose programs start from its top", measure});
+}
+
+/// What is touched off, and which Z it is.
+std::string z_zero_words(const CutSetup& setup) {
+  const double top = setup.blank.max().z() + setup.z_offset;
+  if (setup.options.z_zero == ZZero::kTable) {
+    return joined(
+        {"touch off the face that the blank lies on: Z 0; the top of the blank is then at Z ",
+         decimal_text(top, 3)});
+  }
+  return joined({"touch off the top of the blank, after facing: Z ", decimal_text(top, 3)});
+}
+
 SetupSheet setup_sheet(const WrittenCut& cut) {
   const CutSetup& setup = cut.setup;
   const CamOptions& options = setup.options;
@@ -227,6 +284,11 @@ SetupSheet setup_sheet(const WrittenCut& cut) {
       {"lower left corner of the ", cut.shared ? "blank" : part, ", ", words_for(options.z_zero)});
   sheet.up_words = up_words(options.part, designed);
   sheet.length_words = length_words_of(options.post, cut.programs);
+  sheet.z_words = z_zero_words(setup);
+  if (takes_sheet(cut)) {
+    sheet.sheet = sheet_for(setup.blank.max().z());
+    sheet.height_words = height_words(setup, sheet.sheet);
+  }
   sheet.apron = setup.apron;
   if (lens && designed.setup.front) {
     sheet.front = designed.setup.front;
@@ -358,6 +420,30 @@ ParameterGroup polish_parameters(const CutSetup& setup) {
                                      mm(options.workshop.polish.rim_length, 2)});
   }
   return group;
+}
+
+/// None for a part that is not polished.
+std::optional<PolishTask> polish_task(const CutSetup& setup) {
+  const PolishModel& polish = setup.options.workshop.polish;
+  if (!(polish.sigma > 0.0)) return std::nullopt;
+  const double pitch = setup.pitch();
+  const double scallop = pitch * pitch / (8.0 * finishing_ball(setup.options).radius());
+  return PolishTask{polish, pitch, scallop, setup.lens->setup.lens_size.prod()};
+}
+
+/// Parts that tell the range to a tenth, and take a minute or two.
+constexpr std::string_view kSpreadParts = "50";
+
+/// The command that predicts how much parts differ, for those that --tolerances takes.
+std::string tolerance_hint(const CutSetup& cut, bool shared) {
+  const CamOptions& options = cut.options;
+  const OpticalSetup& setup = cut.lens->setup;
+  if (options.tolerances > 0 || larger_ball(options) != nullptr || setup.outline || setup.front ||
+      !setup.extent.none()) {
+    return "";
+  }
+  return joined({"lensforge ", shared ? std::string("nest") : "cam " + options.job,
+                 " --tolerances ", kSpreadParts});
 }
 
 /// The certificates of all finishing operations in one.
@@ -636,6 +722,8 @@ ReportData make_report(const WrittenCut& cut, const std::optional<Prediction>& p
   data.path = cut.record.shown_path();
   if (prediction) {
     data.parameters.push_back(polish_parameters(setup));
+    data.polish = polish_task(setup);
+    data.tolerance_hint = tolerance_hint(setup, cut.shared);
     add_prediction(*prediction, lens, data);
   }
   data.verdict = whole_verdict(cut, prediction);

@@ -440,18 +440,18 @@ void warn(const RasterOptions& options, OperationSummary& summary) {
   };
   const auto warn_of_height = [&](const Extreme& extreme, const char* what) {
     if (extreme.value <= options.tolerance) return;
-    summary.warnings.push_back("the path runs " + decimal_text(1e3 * extreme.value, 3) + " µm " +
-                               what + " the exact one" + place(extreme) + ", more than the " +
-                               decimal_text(1e3 * options.tolerance, 3) + " µm aimed at");
+    summary.remarks.push_back("the path runs " + decimal_text(1e3 * extreme.value, 3) + " µm " +
+                              what + " the exact one" + place(extreme) + ", more than the " +
+                              decimal_text(1e3 * options.tolerance, 3) + " µm aimed at");
   };
   warn_of_height(certificate.gouge, "below");
   warn_of_height(certificate.excess, "above");
   if (certificate.slope.value <= options.slope_tolerance) return;
-  summary.warnings.push_back("the path's direction is off by " +
-                             decimal_text(1e3 * certificate.slope.value, 2) +
-                             " mrad over a stretch of " + decimal_text(1e3 * kSlopeStretch, 0) +
-                             " µm" + place(certificate.slope) + ", more than the " +
-                             decimal_text(1e3 * options.slope_tolerance, 2) + " mrad aimed at");
+  summary.remarks.push_back("the path's direction is off by " +
+                            decimal_text(1e3 * certificate.slope.value, 2) +
+                            " mrad over a stretch of " + decimal_text(1e3 * kSlopeStretch, 0) +
+                            " µm" + place(certificate.slope) + ", more than the " +
+                            decimal_text(1e3 * options.slope_tolerance, 2) + " mrad aimed at");
 }
 
 }  // namespace

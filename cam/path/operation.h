@@ -83,6 +83,7 @@ struct OperationSummary {
   PathCertificate certificate;
   bool certified = false;  ///< True if `certificate` was computed.
   std::vector<std::string> warnings;
+  std::vector<std::string> remarks;  ///< Certified errors above what was aimed at.
 };
 
 /// Tabs that hold the part in its frame until it is snapped out.

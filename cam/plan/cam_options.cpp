@@ -408,7 +408,7 @@ void describe_split(Description& d, std::uintmax_t& bytes) {
 }
 
 void describe_programs(Description& d, CamOptions& o) {
-  describe_post(d, o.post);
+  describe_post(d, o.post, o.workshop);
   d.word("--programs", o.grouping,
          {{"operation", ProgramGrouping::kOperation},
           {"tool", ProgramGrouping::kTool},

@@ -5,12 +5,14 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "cam/post/builtin_posts.h"
+#include "cam/workshop/workshop.h"
 #include "core/error.h"
 #include "core/schema/toml.h"
 #include "core/text/number_text.h"
@@ -494,15 +496,26 @@ PostDescription find_post(const std::string& name_or_path, const std::string& op
                    " and no path of a .toml file");
 }
 
-void describe_post(Description& d, PostDescription& post) {
+PostDescription post_of(const Workshop& workshop, const std::string& file) {
+  const std::string& name = workshop.machine.post;
+  const std::string key = file.empty() ? "machine.post" : file + ": machine.post";
+  if (!is_path(name)) return find_post(name, key);
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  return find_post((folder / name).string(), key);
+}
+
+void describe_post(Description& d, PostDescription& post, Workshop& workshop) {
   constexpr const char* kOption = "--post";
   d.text(
       {.name = kOption,
-       .help = "dialect, or a description of one",
+       .help = "dialect, or a description of one; a workshop can state it (machine.post)",
        .unit = joined(builtin_posts(), "|") + "|FILE.toml",
        .essential = true},
       [&post] { return post.name; },
-      [&post](const std::string& text) { post = find_post(text, kOption); });
+      [&post, &workshop](const std::string& text) {
+        post = find_post(text, kOption);
+        workshop.machine.post = text;
+      });
 }
 
 }  // namespace lensforge

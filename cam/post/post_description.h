@@ -15,6 +15,7 @@
 namespace lensforge {
 
 class Description;
+struct Workshop;
 
 /// Form of arcs.
 enum class ArcForm {
@@ -105,8 +106,13 @@ PostDescription parse_post(std::string_view toml, const std::string& file);
 /// @throw InputError naming `option` and the value if it is neither; as parse_post().
 PostDescription find_post(const std::string& name_or_path, const std::string& option);
 
-/// The option --post.
-void describe_post(Description& d, PostDescription& post);
+/// The dialect that a workshop states (Machine::post); a description's path is relative to the
+/// folder of the workshop's file. @param file  the workshop's; empty for none.
+/// @throw InputError naming file, key and value; as parse_post().
+PostDescription post_of(const Workshop& workshop, const std::string& file);
+
+/// The option --post. It replaces the workshop's dialect, too.
+void describe_post(Description& d, PostDescription& post, Workshop& workshop);
 
 /// Texts for the placeholders of a description's lines; an empty text drops the line.
 using PlaceholderTexts = std::map<std::string, std::string, std::less<>>;

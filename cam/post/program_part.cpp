@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"
+#include "machine/gcode/program_dialect.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/planner/planner_model.h"
 
@@ -456,6 +457,7 @@ void ProgramPart::write_header() {
     text_.plain_line(comment_line(context_.post, text));
   };
   comment("job: " + context_.plan.job);
+  comment(dialect_text(context_.post.reader.name));
   for (const std::string& line : context_.plan.comments) comment(line);
   std::set<int> listed;
   for (const std::size_t index : operations_) {

@@ -335,8 +335,9 @@ std::vector<Proposal> propose(const Image& picture, const ProposalWish& wish,
   std::vector<Proposal> proposals;
   for (auto& [one, words] : wishes) {
     validate(one.design, picture);
-    proposals.push_back(
-        {words[0], words[1], one.design, forecast(picture, one, executor, control)});
+    ProposalForecast expected = forecast(picture, one, executor, control);
+    if (!proposals.empty() && expected.sheet == 0.0) continue;  // Nobody can make it.
+    proposals.push_back({words[0], words[1], one.design, std::move(expected)});
   }
   return proposals;
 }

@@ -66,6 +66,20 @@ void PathSketch::thin_out() {
   kept_.every *= 2;
 }
 
+std::string z_words(double z_offset) {
+  return joined({"Program Z = lens z ", z_offset < 0.0 ? "− " : "+ ",
+                 decimal_text(std::abs(z_offset), 3), " mm"});
+}
+
+double ReportData::share_of_places() const {
+  if (leakage.steps.empty()) return 0.0;
+  const double whole = judged().part().quality.leakage;
+  if (!(whole > 0.0)) return 0.0;
+  double sum = 0.0;
+  for (const LeakPlace& place : places) sum += place.leakage;
+  return sum / whole;
+}
+
 std::string ReportData::judged_words() const {
   std::string words = joined({"Judged ", light_words, "."});
   if (!blurs.empty()) words = joined({words, " ", blurs_words()});

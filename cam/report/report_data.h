@@ -15,6 +15,7 @@
 #include "cam/report/verdict.h"
 #include "cam/tolerance/tolerance_forecast.h"
 #include "cam/workshop/tool.h"
+#include "cam/workshop/workshop.h"
 #include "core/image/image.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
@@ -92,6 +93,9 @@ struct SetupSheet {
   std::string zero_words;                          ///< "top of the blank, lower left corner …"
   std::string up_words;                            ///< The faces that lie up and down.
   std::string length_words;                        ///< Explains how the tools' lengths get into Z.
+  std::string z_words;                             ///< Where Z0 is and what lens z it is.
+  double sheet = 0.0;               ///< Thickness of the sheet to buy, mm; 0: not from a sheet.
+  std::string height_words;         ///< Explains how the blank gets its height.
   double apron = 0.0;               ///< Width of the surface's continuation around the part, mm.
   std::optional<Front> front;       ///< Of the blank, made before the first cut.
   std::string front_words;          ///< Explains where it has to lie.
@@ -131,6 +135,14 @@ struct ShownSurface {
   std::string words;  ///< A few words about it.
 };
 
+/// What has to be polished after the last cut.
+struct PolishTask {
+  PolishModel model;     ///< As the forecast assumes.
+  double pitch = 0.0;    ///< Of the finishing rows, mm.
+  double scallop = 0.0;  ///< Height of the ridges between them, mm.
+  double area = 0.0;     ///< mm²
+};
+
 /// What a part's roughness scatters.
 struct ReportHaze {
   double share = 0.0;        ///< Haze::share
@@ -138,6 +150,9 @@ struct ReportHaze {
   double roughness = 0.0;    ///< nm, rms.
   double correlation = 0.0;  ///< µm
 };
+
+/// Smallest share of the leakage at which places are listed beside the causes.
+inline constexpr double kWorthPlaces = 0.1;
 
 /// All contents of report.html and report.json.
 struct ReportData {
@@ -159,6 +174,7 @@ struct ReportData {
   Body body;                            ///< Of the part, or of the cast from a mould.
   double ghost = 0.0;                   ///< ghost_share(); 0 if no light passes the part.
   ToleranceForecast tolerances;         ///< Empty unless requested.
+  std::string tolerance_hint;           ///< How to get it, where it was not requested.
   std::vector<LeakPlace> places;        ///< Worst first.
   Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm
 
@@ -167,6 +183,7 @@ struct ReportData {
   std::vector<ReportOperation> operations;
   std::vector<ParameterGroup> parameters;
   SetupSheet setup;
+  std::optional<PolishTask> polish;   ///< None for a part that is not polished.
   std::optional<OpticalSetup> light;  ///< Position of lamp and screen.
   double light_height = 0.0;          ///< Of the part in that light, mm.
   double z_offset = 0.0;              ///< Program Z = lens-frame z + z_offset.
@@ -183,6 +200,10 @@ struct ReportData {
   /// blurs 1.0 pixels, polish 0.4; the widest, diffraction, would be less with a nearer wall. Haze:
   /// 0.313 % of the light, spread over 33.1 pixels."
   [[nodiscard]] std::string judged_words() const;
+  /// Share of the leakage that `places` carry together.
+  [[nodiscard]] double share_of_places() const;
+  /// True if they carry kWorthPlaces of it: elsewhere a remedy at single places changes nothing.
+  [[nodiscard]] bool places_matter() const { return share_of_places() >= kWorthPlaces; }
   /// The blurs alone.
   [[nodiscard]] std::string blurs_words() const;
   /// By what the part is judged.
@@ -198,6 +219,9 @@ struct ReportData {
 /// infinite values as null): "z_offset", "verdict", "surfaces", "leakage", "places", "tools",
 /// "operations", "setup", "parameters", "warnings", "choices", …
 nlohmann::json report_json(const ReportData& data);
+
+/// The programs' zero in the lens frame: "Program Z = lens z − 16.716 mm".
+std::string z_words(double z_offset);
 
 /// One line of the ranking of --compare.
 nlohmann::json choice_json(const ReportChoice& choice);

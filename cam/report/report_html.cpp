@@ -72,7 +72,9 @@ std::string leakage_figure(const LeakageResult& result) {
 }
 
 std::string signed_text(double value, int decimals) {
-  return (value < 0.0 ? "−" : "+") + decimal_text(std::abs(value), decimals);
+  std::string digits = decimal_text(std::abs(value), decimals);
+  if (digits.find_first_of("123456789") == std::string::npos) return digits;
+  return (value < 0.0 ? "−" : "+") + digits;
 }
 
 std::string sampling_sentence(const SamplingCheck& check) {
@@ -86,7 +88,7 @@ std::string sampling_sentence(const SamplingCheck& check) {
 
 std::string check_value(double value, const LimitCheck& check) {
   return escape_html(decimal_text(value, check.decimals) +
-                     (check.unit.empty() ? "" : " " + check.unit));
+                     (check.unit.empty() ? "" : "\u00a0" + check.unit));
 }
 
 std::string check_state(const LimitCheck& check) {
@@ -104,6 +106,19 @@ std::string headline(const Verdict& verdict) {
   if (verdict.missed() > 0) return "✘ " + counted(verdict.missed(), "limit") + " missed";
   if (verdict.passes()) return "✔ Within all limits";
   return "✔ No limit missed; advice on " + counted(verdict.advice(), "value");
+}
+
+/// The range of parts, or how to get it; empty where it cannot be had.
+std::string spread_of_parts(const ReportData& data) {
+  if (!data.tolerances.empty()) {
+    return element("p", "", escape_html(tolerance_words(data.tolerances)));
+  }
+  if (data.tolerance_hint.empty()) return "";
+  return element(
+      "p", "",
+      "This is one part without errors. What 8 of 10 parts show is predicted by " +
+          element("code", "style=\"white-space:nowrap\"", escape_html(data.tolerance_hint)) +
+          ", with the other options as now.");
 }
 
 std::string tool_words(const Tool& tool) {
@@ -156,17 +171,28 @@ std::string verdict(const ReportData& data) {
   }
   const std::vector<TableColumn> columns{
       {"what", false}, {"found", true}, {"at most", true}, {"limit", false}};
-  return element("div", "", element("h3", "", "Limits") + html_table(columns, rows));
+  return element("div", "",
+                 element("h3", "", "Limits") + html_table(columns, rows) + spread_of_parts(data));
 }
 
 std::string places(const ReportData& data) {
   if (data.places.empty()) return "";
+  const std::string share = percent_text(data.share_of_places());
+  if (!data.places_matter()) {
+    return element("div", "",
+                   element("h3", "", "Worst places") +
+                       element("p", "",
+                               joined({"None stands out: the ", std::to_string(data.places.size()),
+                                       " worst carry ", share,
+                                       " of the leak together. See “Leakage by cause” below."})));
+  }
   std::string items;
   for (const LeakPlace& place : data.places) {
     items += element("li", "", escape_html(leak_words(place)));
   }
   return element("div", "",
                  element("h3", "", "Worst places on the " + data.lit_part()) +
+                     element("p", "class=\"soft\"", "Together " + share + " of the leak.") +
                      element("ol", "class=\"places\"", items));
 }
 
@@ -195,9 +221,8 @@ std::string footer(const ReportData& data) {
       std::string(
           "Lengths in mm, lens frame: origin at the part's lower left corner seen from "
           "above, x right, y away, z up from the ") +
-      (traits(data.body).transmits ? "entry face" : "underside") + ". Program Z = z " +
-      std::string(data.z_offset < 0.0 ? "− " : "+ ") + decimal_text(std::abs(data.z_offset), 4) +
-      " mm.";
+      (traits(data.body).transmits ? "entry face" : "underside") + ". " + z_words(data.z_offset) +
+      ".";
   if (data.seconds > 0.0) text += " Made in " + decimal_text(data.seconds, 0) + " s.";
   return escape_html(text);
 }
@@ -347,9 +372,9 @@ std::string report_html(const ReportData& data) {
   namespace section = report_section;
   const std::string body = joined(
       {summary(data), section::warnings(data), section::setup(data), section::operations(data),
-       section::certificates(data), section::leakage(data), section::tolerances(data),
+       section::polish(data), section::leakage(data), section::tolerances(data),
        section::light(data), section::maps(data), section::view(data), view_link(data),
-       section::choices(data), section::parameters(data)});
+       section::choices(data), section::certificates(data), section::parameters(data)});
   return html_page({data.job + " – cutting report", section::header(data), body,
                     section::footer(data), std::string(surface_view_script())});
 }

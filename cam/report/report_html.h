@@ -36,6 +36,7 @@ std::string warnings(const ReportData& data);
 std::string setup(const ReportData& data);
 std::string light(const ReportData& data);  ///< Lamp, part and screen.
 std::string operations(const ReportData& data);
+std::string polish(const ReportData& data);
 std::string certificates(const ReportData& data);
 std::string leakage(const ReportData& data);
 std::string tolerances(const ReportData& data);

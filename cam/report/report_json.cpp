@@ -160,7 +160,8 @@ json operation_json(const ReportOperation& operation) {
               {"stepdown", s.stepdown},
               {"allowance", s.allowance},
               {"extent", box_json(s.tip)},
-              {"warnings", s.warnings}};
+              {"warnings", s.warnings},
+              {"remarks", s.remarks}};
   if (s.certified) {
     object["certificate"] = {{"gouge", extreme_json(s.certificate.gouge)},
                              {"excess", extreme_json(s.certificate.excess)},
@@ -185,7 +186,9 @@ json setup_json(const SetupSheet& setup) {
              {"part", box_json(setup.part)}, {"blank", box_json(setup.blank)},
              {"zero", triple(setup.zero)},   {"zero_words", setup.zero_words},
              {"up_words", setup.up_words},   {"length_words", setup.length_words},
-             {"apron", setup.apron},         {"keep_outs", list(setup.keep_outs, box)}};
+             {"apron", setup.apron},         {"keep_outs", list(setup.keep_outs, box)},
+             {"z_words", setup.z_words},     {"height_words", setup.height_words}};
+  if (setup.sheet > 0.0) sheet["sheet_mm"] = setup.sheet;
   if (setup.front) {
     sheet["front"] = std::visit([](const auto& front) { return front_json(front); }, *setup.front);
   }

@@ -109,6 +109,8 @@ struct Ring {
 };
 
 constexpr double kRingRadius = 3.5;
+constexpr double kWidestRing = 12.0;
+constexpr double kRingStroke = 0.8;  ///< Half of the black one's width.
 constexpr double kFontSize = 7.0;
 constexpr double kFontStroke = 1.4;
 /// Of a digit of the widest bold fonts that stand in for Arial (DejaVu Sans), in font sizes.
@@ -142,17 +144,30 @@ void draw_number(SvgWriter& svg, const Ring& ring, const Eigen::Vector2d& size) 
            ring.number);
 }
 
-/// Numbered rings at the worst places.
+/// The ring moved as little as needed to lie on the map as a whole.
+Ring on_map(Ring ring, const Eigen::Vector2d& size) {
+  const double room = ring.radius + kRingStroke;
+  for (int k = 0; k < 2; ++k) {
+    const double low = std::min(room, 0.5 * size[k]);
+    ring.centre[k] = std::clamp(ring.centre[k], low, size[k] - low);
+  }
+  return ring;
+}
+
+/// Numbered rings around the worst places, and a dot at each of them.
 std::string place_rings(const ReportData& data) {
   const double unit = data.lens_size.maxCoeff() / 100.0;
   const Eigen::Vector2d size = data.lens_size / unit;
   SvgWriter svg(2);
-  for (std::size_t k = 0; k < data.places.size(); ++k) {
+  const std::size_t shown = data.places_matter() ? data.places.size() : 0;
+  for (std::size_t k = 0; k < shown; ++k) {
     const LeakPlace& place = data.places[k];
     const Eigen::Vector2d centre = place.place / unit;
-    const Ring ring{{centre.x(), size.y() - centre.y()},
-                    std::max(kRingRadius, 0.5 * place.side / unit),
-                    std::to_string(k + 1)};
+    const Ring around{{centre.x(), size.y() - centre.y()},
+                      std::clamp(0.5 * place.side / unit, kRingRadius, kWidestRing),
+                      std::to_string(k + 1)};
+    const Ring ring = on_map(around, size);
+    svg.circle(around.centre, "r=\"0.9\" fill=\"#fff\" stroke=\"#000\" stroke-width=\"0.4\"");
     draw_ring(svg, ring, "stroke=\"#000\" stroke-width=\"1.6\"");
     draw_ring(svg, ring, "stroke=\"#fff\" stroke-width=\"0.8\"");
     draw_number(svg, ring, size);
@@ -162,16 +177,24 @@ std::string place_rings(const ReportData& data) {
               "\" aria-hidden=\"true\" font-family=\"Arial, sans-serif\""}));
 }
 
+/// False for a map of one value, such as creases where there are none.
+bool shows_anything(const ReportMap& map) {
+  const auto [low, high] = std::minmax_element(map.raster.values.begin(), map.raster.values.end());
+  return !map.raster.empty() && *low < *high;
+}
+
 std::string map_figure(const ReportMap& map, const ReportData& data) {
   const auto [low, high] = std::minmax_element(map.raster.values.begin(), map.raster.values.end());
   const int decimals = decimals_for(*high - *low);
   const std::string picture = "<img src=\"" + png_uri(raster_picture(map.raster, *low, *high)) +
-                              "\" alt=\"" + escape_html(map.title) + "\">";
+                              "\" alt=\"" + escape_html(map.title) +
+                              "\" style=\"aspect-ratio:" + decimal_text(data.lens_size.x(), 3) +
+                              "/" + decimal_text(data.lens_size.y(), 3) + "\">";
   const std::string scale =
       html_scale(decimal_text(*low, decimals), decimal_text(*high, decimals) + " " + map.unit);
   const std::string caption =
       element("b", "", escape_html(map.title)) + "<br>" + escape_html(map.note) + scale;
-  return element("figure", "class=\"map\"",
+  return element("figure", "class=\"map\" style=\"max-width:34rem\"",
                  element("div", "class=\"frame\"", picture + place_rings(data)) +
                      element("figcaption", "", caption));
 }
@@ -181,15 +204,16 @@ std::string map_figure(const ReportMap& map, const ReportData& data) {
 std::string maps(const ReportData& data) {
   std::string figures;
   for (const ReportMap& map : data.maps) {
-    if (!map.raster.empty()) figures += map_figure(map, data);
+    if (shows_anything(map)) figures += map_figure(map, data);
   }
   if (figures.empty()) return "";
   return element(
       "section", "",
       element("h2", "", "Maps of the " + escape_html(data.part)) +
           element("p", "",
-                  "Seen from above as mounted on the machine: x to the right, y away from the "
-                  "operator. Rings with numbers are the worst places.") +
+                  std::string("Seen from above as mounted on the machine: x to the right, y away "
+                              "from the operator.") +
+                      (data.places_matter() ? " Rings with numbers are the worst places." : "")) +
           element("div", "class=\"maps\"", figures));
 }
 

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "cam/report/polish_recipe.h"
 #include "cam/report/report_html.h"
 #include "cam/report/report_maps.h"
 #include "cam/tolerance/part_error.h"
@@ -249,15 +250,22 @@ std::string quality_table(const LeakageResult& result) {
                  rows);
 }
 
+/// Sentences about an operation as items of a list.
+std::string list_items(const OperationSummary& operation, const std::vector<std::string>& words) {
+  std::string items;
+  for (const std::string& one : words) {
+    items += element("li", "", escape_html(operation.name + ": " + one));
+  }
+  return items;
+}
+
 }  // namespace
 
 std::string warnings(const ReportData& data) {
   std::string items;
   for (const std::string& warning : data.warnings) items += element("li", "", escape_html(warning));
   for (const ReportOperation& operation : data.operations) {
-    for (const std::string& warning : operation.summary.warnings) {
-      items += element("li", "", escape_html(operation.summary.name + ": " + warning));
-    }
+    items += list_items(operation.summary, operation.summary.warnings);
   }
   if (items.empty()) return "";
   return element("section", "class=\"warnings\"",
@@ -275,10 +283,14 @@ std::string nest_words(const SetupSheet& sheet) {
 std::string setup(const ReportData& data) {
   const SetupSheet& sheet = data.setup;
   if (sheet.blank.isEmpty()) return "";
-  std::vector<NamedText> list{
-      {"Machine", sheet.machine},       {"Blank", box_text(sheet.blank) + ", " + sheet.material},
-      {"Part", box_text(sheet.part)},   {"Program zero", sheet.zero_words},
-      {"Which way up", sheet.up_words}, {"Tool length", sheet.length_words}};
+  std::vector<NamedText> list{{"Machine", sheet.machine},
+                              {"Blank", box_text(sheet.blank) + ", " + sheet.material}};
+  if (!sheet.height_words.empty()) list.push_back({"Its height", sheet.height_words});
+  list.insert(list.end(), {{"Part", box_text(sheet.part)},
+                           {"Which way up", sheet.up_words},
+                           {"Program zero", sheet.zero_words}});
+  if (!sheet.z_words.empty()) list.push_back({"Set Z", sheet.z_words});
+  list.insert(list.end(), {{"Z", z_words(data.z_offset)}, {"Tool length", sheet.length_words}});
   if (sheet.apron > 0.0) {
     list.push_back({"Rim", joined({"the surface is cut ", decimal_text(sheet.apron, 2),
                                    " mm beyond the part on every side; ",
@@ -353,8 +365,25 @@ std::string operations(const ReportData& data) {
                                                       rows));
 }
 
+std::string polish(const ReportData& data) {
+  if (!data.polish) return "";
+  std::vector<Row> rows;
+  for (const PolishStep& step : example_steps(*data.polish)) {
+    rows.push_back(
+        {escape_html(step.grit), decimal_text(step.minutes, 0), std::to_string(step.strokes)});
+  }
+  const auto words = [](const std::string& text) { return element("p", "", escape_html(text)); };
+  const std::string table =
+      rows.empty()
+          ? ""
+          : stacked({{"grit, an example", false}, {"minutes", true}, {"strokes", true}}, rows);
+  return html_section(
+      "Polish", words(expected_polish(*data.polish)) + table + words(polish_advice(*data.polish)));
+}
+
 std::string certificates(const ReportData& data) {
   std::vector<Row> rows;
+  std::string remarks;
   for (const ReportOperation& op : data.operations) {
     if (!op.summary.certified) continue;
     const PathCertificate& c = op.summary.certificate;
@@ -363,8 +392,10 @@ std::string certificates(const ReportData& data) {
          certificate_cell(c.gouge, micrometre_text(c.gouge.value), data.z_offset),
          certificate_cell(c.excess, micrometre_text(c.excess.value), data.z_offset),
          certificate_cell(c.slope, decimal_text(1e3 * c.slope.value, 2) + " mrad", data.z_offset)});
+    remarks += list_items(op.summary, op.summary.remarks);
   }
   if (rows.empty()) return "";
+  if (!remarks.empty()) remarks = element("ul", "", remarks);
   return html_section("Certificates",
                       element("p", "",
                               "Error bounds of every move over its whole length, against the exact "
@@ -373,7 +404,8 @@ std::string certificates(const ReportData& data) {
                                    {"deepest gouge", false},
                                    {"most material left", false},
                                    {"largest error of the path’s direction", false}},
-                                  rows));
+                                  rows) +
+                          remarks);
 }
 
 /// A note on the light in dark parts, by the kind of part: from the ridges of a mirror, or from

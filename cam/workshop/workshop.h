@@ -186,10 +186,11 @@ inline constexpr std::size_t kErrorCauses = 10;
 /// The mill. Limits belong to the axes x, y, z.
 struct Machine {
   std::string name = "JDGR100 in 3-axis mode";
-  Eigen::Vector3d travel{400.0, 400.0, 150.0};           ///< mm
-  double spindle_min_rpm = 3000.0;                       ///< ≥ 0
-  double spindle_max_rpm = 24000.0;                      ///< > 0
-  bool spindle_by_hand = false;                          ///< The program cannot switch it.
+  std::string post = "linuxcnc";                ///< Dialect of its controller, see post_of().
+  Eigen::Vector3d travel{400.0, 400.0, 150.0};  ///< mm
+  double spindle_min_rpm = 3000.0;              ///< ≥ 0
+  double spindle_max_rpm = 24000.0;             ///< > 0
+  bool spindle_by_hand = false;                 ///< The program cannot switch it.
   Eigen::Vector3d max_rate{10000.0, 10000.0, 6000.0};    ///< Rapids and feeds at most, mm/min.
   Eigen::Vector3d acceleration{2000.0, 2000.0, 1000.0};  ///< mm/s²
   double junction_deviation = 0.005;                     ///< Rounding of corners, mm.

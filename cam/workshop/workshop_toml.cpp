@@ -85,6 +85,9 @@ void describe(Description& d, Machine& machine) {
   d.text("name", machine.name, "",
          "the paper's mill (Sun et al., Section 5); its limits below are "
          "assumed: put in your own");
+  d.text("post", machine.post, "",
+         "dialect of its controller: linuxcnc, grbl, grblhal, fanuc, weihong, or a description "
+         "beside this file, mine.toml");
   describe_axes(d, "travel", machine.travel, {kMinRate, kLength}, "mm", "mm");
   d.number("spindle_min_rpm", machine.spindle_min_rpm, {0.0, kSpin}, "rpm", "");
   d.number("spindle_max_rpm", machine.spindle_max_rpm, {1.0, kSpin}, "rpm",

@@ -70,7 +70,10 @@ TEST(NextStep, ChecksTheFirstProgramWhereSendTakesIt) {
   const std::string send = "; then: lensforge send 'my lens/cam/rough.ngc' --dry-run";
   EXPECT_EQ(next_step_with("grbl", 0), page + send);
   EXPECT_EQ(next_step_with("grblhal", 0), page + send + " --dialect grblhal");
-  EXPECT_EQ(next_step_with("linuxcnc", 0), page);
+  EXPECT_EQ(next_step_with("linuxcnc", 0),
+            page +
+                "; then run 'my lens/cam/rough.ngc' first, on a machine with linuxcnc (--post grbl "
+                "makes programs for lensforge send)");
   EXPECT_EQ(next_step_with("grbl", 1), page) << "a limit was missed";
 }
 

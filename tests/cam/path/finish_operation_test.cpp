@@ -163,8 +163,8 @@ TEST(FinishOperation, WarnsWhereTheTolerancesAreNotHeld) {
   plan.options.resolution = 0.001;
   const Cut result = cut(relief(), plan);
   ASSERT_GT(result.summary.certificate.slope.value, plan.options.slope_tolerance);
-  ASSERT_FALSE(result.summary.warnings.empty());
-  EXPECT_THAT(result.summary.warnings.back(), HasSubstr("direction is off by"));
+  ASSERT_FALSE(result.summary.remarks.empty());
+  EXPECT_THAT(result.summary.remarks.back(), HasSubstr("direction is off by"));
 }
 
 TEST(FinishOperation, StoppedIsNotComplete) {

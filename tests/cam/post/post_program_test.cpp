@@ -109,17 +109,18 @@ TEST(ProgramWriter, TheHeaderTellsJobToolExtentTimeAndSeal) {
   const ProgramFiles files = write(plan, "linuxcnc", folder);
   const auto lines = lines_of(read_bytes(folder / "finish.ngc"));
   EXPECT_EQ(lines[0], "(job: hostile _M3__G0 Z-9 ___ caf__)");
-  EXPECT_EQ(lines[1], "(Z0: top of the blank)");
-  EXPECT_EQ(lines[2], std::string("(").append(78, 'y').append(")"));
-  EXPECT_EQ(lines[3], "(T1: ball-end mill 0.4 mm, 23000 rpm, F 500, plunge 150)");
-  EXPECT_EQ(lines[4],
+  EXPECT_EQ(lines[1], "(dialect: linuxcnc)");
+  EXPECT_EQ(lines[2], "(Z0: top of the blank)");
+  EXPECT_EQ(lines[3], std::string("(").append(78, 'y').append(")"));
+  EXPECT_EQ(lines[4], "(T1: ball-end mill 0.4 mm, 23000 rpm, F 500, plunge 150)");
+  EXPECT_EQ(lines[5],
             "(Z: touch off Z with this tool, T1, unless the tool table has its length, G43)");
-  EXPECT_THAT(lines[5], ::testing::StartsWith("(cutting X 1.0000 to 5.0000, Y 2.0000 to 2.0000 "));
-  EXPECT_THAT(lines[6], ::testing::StartsWith("(cutting Z -1.6000 to 5.0000 "));
-  EXPECT_THAT(lines[7], HasSubstr(std::to_string(lines.size()) + " lines, cutting length"));
-  EXPECT_THAT(lines[8], HasSubstr("part 1 of 1"));
-  EXPECT_THAT(lines[9], ::testing::StartsWith("(finish: "));
-  EXPECT_EQ(lines[10], std::string("(").append(seal_text(files.files[0].sha256)).append(")"));
+  EXPECT_THAT(lines[6], ::testing::StartsWith("(cutting X 1.0000 to 5.0000, Y 2.0000 to 2.0000 "));
+  EXPECT_THAT(lines[7], ::testing::StartsWith("(cutting Z -1.6000 to 5.0000 "));
+  EXPECT_THAT(lines[8], HasSubstr(std::to_string(lines.size()) + " lines, cutting length"));
+  EXPECT_THAT(lines[9], HasSubstr("part 1 of 1"));
+  EXPECT_THAT(lines[10], ::testing::StartsWith("(finish: "));
+  EXPECT_EQ(lines[11], std::string("(").append(seal_text(files.files[0].sha256)).append(")"));
   EXPECT_EQ(check_seal(folder / "finish.ngc"), true);
   for (const std::string& line : lines) EXPECT_LE(line.size(), 80U);
   EXPECT_EQ(files.files[0].bytes, std::filesystem::file_size(folder / "finish.ngc"));

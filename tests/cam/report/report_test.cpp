@@ -204,6 +204,73 @@ TEST(Report, NumbersOfRingsStayOnTheMap) {
   }
 }
 
+TEST(Report, RingsStayOnTheMap) {
+  ReportData data = report_of("logo");
+  data.lens_size = {30.0, 20.0};
+  LeakPlace place = data.places.front();
+  data.places.clear();
+  for (const Eigen::Vector2d& at :
+       {Eigen::Vector2d(0, 0), Eigen::Vector2d(30, 20), Eigen::Vector2d(15, 0.1)}) {
+    place.place = at;
+    place.side = 9.0;
+    data.places.push_back(place);
+  }
+  const std::string html = report_html(data);
+  std::size_t at = html.find("class=\"map\"");
+  for (std::size_t k = 0; k < data.places.size(); ++k) {
+    at = html.find("<circle", html.find("<circle", at + 1) + 1);  // After the dot.
+    const double x = number_in(html, "<circle", "cx", at);
+    const double y = number_in(html, "<circle", "cy", at);
+    const double r = number_in(html, "<circle", "r", at) + 0.8;
+    EXPECT_GE(std::min(x - r, y - r), -0.01) << k;
+    EXPECT_LE(x + r, 100.01) << k;
+    EXPECT_LE(y + r, 200.0 / 3.0 + 0.01) << k;
+    at = html.find("<text", at);
+  }
+}
+
+TEST(Report, ListsPlacesOnlyWhereTheyMatterBesideTheSum) {
+  ReportData data = report_of("logo");
+  data.leakage.steps.front().quality.leakage = 0.1;
+  data.places.front().leakage = 0.011;
+  EXPECT_TRUE(data.places_matter());
+  EXPECT_THAT(report_html(data), HasSubstr("Together 11.0 % of the leak"));
+  data.places.front().leakage = 0.009;
+  EXPECT_FALSE(data.places_matter());
+  const std::string html = report_html(data);
+  EXPECT_THAT(html, HasSubstr("None stands out"));
+  EXPECT_THAT(html, Not(HasSubstr("Rings with numbers")));
+  EXPECT_EQ(report_json(data)["places"].size(), 1U);
+}
+
+TEST(Report, ErrorsOfThePathAreBesideTheCertificates) {
+  ReportData data = report_of("logo");
+  data.warnings.clear();
+  data.operations.front().summary.warnings.clear();
+  data.operations.front().summary.remarks = {"the path's direction is off by 1.12 mrad"};
+  const std::string html = report_html(data);
+  EXPECT_THAT(html, Not(HasSubstr("Before you start")));
+  EXPECT_GT(html.find("direction is off by 1.12 mrad"), html.find("Certificates"));
+}
+
+TEST(Report, PolishIsExamplesAndACoupon) {
+  ReportData data = report_of("logo");
+  EXPECT_THAT(report_html(data), Not(HasSubstr("<h2>Polish</h2>")));
+  data.polish = PolishTask{{0.03, 0.0, 1.0}, 0.06, 0.00225, 625.0};
+  const std::string html = report_html(data);
+  EXPECT_THAT(html, HasSubstr("σ 0.030 mm: of the rows, 0.060 mm apart and 2.25 µm high, 0.719 %"));
+  EXPECT_THAT(html, HasSubstr("9 µm (film P2500)"));
+  EXPECT_THAT(html, HasSubstr("not a measured recipe"));
+  EXPECT_THAT(html, HasSubstr("lensforge coupon --fit"));
+  data.polish->model.order = 4;
+  EXPECT_THAT(report_html(data), Not(HasSubstr("9 µm")));
+}
+
+TEST(Report, StatesTheZeroWithItsSignAndUnit) {
+  EXPECT_EQ(z_words(-16.7164), "Program Z = lens z − 16.716 mm");
+  EXPECT_EQ(z_words(0.5), "Program Z = lens z + 0.500 mm");
+}
+
 TEST(Report, LeavesOutWhatIsNotThere) {
   ReportData data;
   data.job = "bare";
