@@ -115,8 +115,10 @@ inline constexpr const char* kPolished = "polished";  ///< As designed, but poli
 inline constexpr const char* kPart = "part";          ///< Cut and polished.
 }  // namespace part_layer
 
-/// Approximate number of nodes of a surface in part.exr: the limit for a page of 25 MB.
-inline constexpr double kPartNodes = 4e5;
+/// Approximate maximum number of nodes of a surface in part.exr: more would not fit a page of 15 MB.
+inline constexpr double kPartNodes = 6.3e6;
+/// Minimum spacing of these nodes, mm: a part polished with σ = 30 µm has nothing finer.
+inline constexpr double kPartSpacing = 0.03;
 
 /// The nodes of a surface's layers: columns and rows, evenly over the lens, and the cells of the
 /// sampled grid between two of them.
@@ -133,9 +135,8 @@ PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spac
 /// part_grid() with kPartNodes.
 GridWindow sampled_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings);
 
-/// Heights, mm, and slopes of surfaces as layers "NAME.z", "NAME.slope_x" and "NAME.slope_y", at
-/// nodes evenly over the lens, the upper left one first, taken from the tiles sampled for the
-/// surfaces' pictures.
+/// Heights of surfaces, mm, as layers "NAME.z" at nodes evenly over the lens, the upper left one
+/// first, taken from the tiles sampled for the surfaces' pictures.
 class PartLayers {
  public:
   /// @param spacings  as of sampled_grid(), whose tiles are taken.
