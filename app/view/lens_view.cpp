@@ -527,7 +527,7 @@ std::string facts(const LensView& view) {
 /// Says which model of light the page has.
 std::string model_words(const LensView& view) {
   std::string words = "This page computes light by rays, without diffraction";
-  words += view.waves.empty() ? "." : "; the program's pictures by waves are beside it.";
+  words += view.waves.empty() ? "." : "; the program's pictures by waves are below.";
   return element("p", "class=\"model\"", words);
 }
 
@@ -541,7 +541,8 @@ std::string wave_figures(const LensView& view) {
                                 "\" alt=\"Picture by waves\">") +
                         element("figcaption", "",
                                 "<b>By waves</b> " + escape_html(wave.words) +
-                                    ": the program's picture with diffraction"));
+                                    ": the program's picture with diffraction; "
+                                    "controls do not change it"));
   }
   return html;
 }
@@ -565,6 +566,7 @@ std::string lens_section(const LensView& view) {
   data.surface = view.relief;
   data.lens_size = view.setup.lens_size;
   data.path = view.path;
+  data.path_shown = false;  // It would hide the relief.
   return surface_view_html(data);
 }
 

@@ -19,7 +19,7 @@ TEST(PartLayers, GridIsEvenAndAsFineAsAsked) {
     EXPECT_LE(kSize[axis] / (grid.nodes[axis] - 1) / grid.every[axis], 0.01 * (1.0 + 1e-12));
   }
   // No finer than a polished part needs, nor than what is sampled.
-  EXPECT_EQ(part_grid(kSize, {0.01, 0.01}, 1e9).every, Eigen::Vector2i(3, 3));
+  EXPECT_EQ(part_grid(kSize, {0.5 * kPartSpacing, 0.02}, 1e9).every, Eigen::Vector2i(2, 1));
   EXPECT_EQ(part_grid(kSize, {1.0, 1.0}, 1e6).nodes, Eigen::Vector2i(31, 21));
   EXPECT_EQ(part_grid(kSize, {1.0, 1.0}, 1e6).every, Eigen::Vector2i(1, 1));
 }

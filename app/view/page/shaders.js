@@ -251,6 +251,7 @@ uniform float weight;
 uniform bool pairs;
 flat out vec4 ab, cd;
 flat out vec2 light;
+flat out float inside;  // 1 if all of it is in one pixel.
 
 float flux(int t) { return weight * texelFetch(fluxes, at(t), 0).x; }
 vec2 landing(int i) { return (0.5 + 0.5 * texelFetch(landings, at(i), 0).xy / halves) * pixels; }
@@ -272,8 +273,11 @@ void main() {
   ab = vec4(a, b);
   cd = vec4(c, d);
   vec2 first = vec2(part.xy), size = vec2(part.zw);
-  vec2 low = clamp(floor(min(min(a, b), min(c, d)) - ${kWide}) - first, vec2(0.0), size);
-  vec2 high = clamp(ceil(max(max(a, b), max(c, d)) + ${kWide}) - first, vec2(0.0), size);
+  vec2 least = min(min(a, b), min(c, d)), most = max(max(a, b), max(c, d));
+  inside = floor(least) == floor(most) ? 1.0 : 0.0;
+  float wide = inside > 0.0 ? 0.0 : ${kWide};
+  vec2 low = clamp(floor(least - wide) - first, vec2(0.0), size);
+  vec2 high = clamp(floor(most + wide) + 1.0 - first, vec2(0.0), size);
   float side = max(high.x - low.x, high.y - low.y);
   bool seen = light.x + light.y > 0.0 && high.x > low.x && high.y > low.y;
   // A point whose centre is outside is not drawn.
@@ -286,6 +290,7 @@ void main() {
 const kAdd = kHead + `
 flat in vec4 ab, cd;
 flat in vec2 light;
+flat in float inside;
 out vec4 sum;
 
 float cross_(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
@@ -322,6 +327,10 @@ float share(vec2 a, vec2 b, vec2 c) {
 }
 
 void main() {
+  if (inside > 0.0) {
+    sum = vec4(light.x + light.y, 0.0, 0.0, 0.0);
+    return;
+  }
   vec2 pixel = floor(gl_FragCoord.xy), a = ab.xy - pixel, c = cd.xy - pixel;
   float light_ = 0.0;
   if (light.x > 0.0) light_ += light.x * share(a, ab.zw - pixel, c);
