@@ -304,7 +304,8 @@ void add_waves(const fs::path& folder, const RunControl& control, LensView& view
   // Without waves, the part's wall.png is by rays.
   const nlohmann::json document =
       parse_json(read_whole_file(report, kMaxReportBytes), report.string());
-  if (document.contains("waves")) add(folder / lens_file::kCut / cam_file::kWall, "cut and polished");
+  if (document.contains("waves"))
+    add(folder / lens_file::kCut / cam_file::kWall, "cut and polished");
 }
 
 LensRaster relief_of(const Lens& lens) {

@@ -174,8 +174,8 @@ StoredSurface store_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& nor
   stored.triangles = mesh.triangle_count();
   stored.read_back.mesh = mesh;
   const int columns = mesh.grid.is_grid() ? mesh.grid.columns : static_cast<int>(stored.vertices);
-  const double apart =
-      std::sqrt(setup.lens_size.prod() / std::max<double>(1.0, static_cast<double>(stored.vertices)));
+  const double apart = std::sqrt(setup.lens_size.prod() /
+                                 std::max<double>(1.0, static_cast<double>(stored.vertices)));
   const double step = place_step(setup, apart);
   add_places(stored, setup, columns, step);
   add(stored, "z", columns, step, stored.read_back.mesh.vertices.row(2), zero);

@@ -115,7 +115,8 @@ inline constexpr const char* kPolished = "polished";  ///< As designed, but poli
 inline constexpr const char* kPart = "part";          ///< Cut and polished.
 }  // namespace part_layer
 
-/// Approximate maximum number of nodes of a surface in part.exr: more would not fit a page of 15 MB.
+/// Approximate maximum number of nodes of a surface in part.exr: more would not fit a page of 15
+/// MB.
 inline constexpr double kPartNodes = 6.3e6;
 /// Minimum spacing of these nodes, mm. A 64² portrait's part, polished with σ = 30 µm, has an error
 /// of MAE 0.0005 with nodes every 0.01 × 0.03 mm and 0.0022 with 0.03 × 0.03 mm.

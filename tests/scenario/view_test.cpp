@@ -135,10 +135,11 @@ TEST_F(View, ShowsTheForecastOfThePartAndTheCauseAtASpot) {
   EXPECT_LT(mae(pictures[0], forecast), 0.01);
   EXPECT_LT(mae(pictures[0], forecast), 0.7 * mae(pictures[1], forecast));
 
-  const PageRun errors = testing::run_page(
-      at("view.html"),
-      "const view = window.lensView, errors = []; for (const id of ['designed', 'polished', 'part']) "
-      "{ view.set('surface', id); await view.finished(); errors.push(view.error); } return errors;");
+  const PageRun errors = testing::run_page(at("view.html"),
+                                           "const view = window.lensView, errors = []; for (const "
+                                           "id of ['designed', 'polished', 'part']) "
+                                           "{ view.set('surface', id); await view.finished(); "
+                                           "errors.push(view.error); } return errors;");
   ASSERT_TRUE(errors.result.is_array()) << errors.error;
   for (const auto& error : errors.result) EXPECT_LT(error.get<double>(), 1e-3);
 
@@ -161,12 +162,12 @@ LayeredImage thinned(const LayeredImage& fine, int every) {
   for (const std::string& name : fine.names()) {
     for (int row = 0; row < coarse.rows(); ++row) {
       for (int column = 0; column < coarse.columns(); ++column) {
-        const std::size_t from = static_cast<std::size_t>(row * every) *
-                                     static_cast<std::size_t>(fine.columns()) +
-                                 static_cast<std::size_t>(column * every);
-        const std::size_t to = static_cast<std::size_t>(row) *
-                                   static_cast<std::size_t>(coarse.columns()) +
-                               static_cast<std::size_t>(column);
+        const std::size_t from =
+            static_cast<std::size_t>(row * every) * static_cast<std::size_t>(fine.columns()) +
+            static_cast<std::size_t>(column * every);
+        const std::size_t to =
+            static_cast<std::size_t>(row) * static_cast<std::size_t>(coarse.columns()) +
+            static_cast<std::size_t>(column);
         coarse.layer(name)[to] = fine.layer(name)[from];
       }
     }

@@ -200,8 +200,7 @@ Lens folding_spline() {
     for (int i = 0; i < net.shape.columns; ++i) {
       const double u = greville_point(i, kCells) / kCells;
       const double v = greville_point(j, kCells) / kCells;
-      net.points.col(j * net.shape.columns + i)
-          << kSize.x() * (u + 0.02 * std::sin(6.283185 * u)),
+      net.points.col(j * net.shape.columns + i) << kSize.x() * (u + 0.02 * std::sin(6.283185 * u)),
           kSize.y() * (v - 0.02 * std::sin(6.283185 * v)),
           5.0 + 0.4 * std::sin(9.0 * u) * std::cos(8.0 * v);
     }
@@ -220,9 +219,8 @@ TEST(PageSpline, ThatFoldsItsLightHasNoSpecks) {
   const LensView view = view_of_lens(lens, "folds", Executor::cpu(2));
   EXPECT_LT(view.surfaces.front().storage_error, 5e-4);
   testing::write_bytes(folder / "view.html", view_page(view));
-  const PageRun run =
-      testing::run_page(folder / "view.html",
-                        "await lensView.finished(); return Array.from(lensView.picture());");
+  const PageRun run = testing::run_page(
+      folder / "view.html", "await lensView.finished(); return Array.from(lensView.picture());");
   EXPECT_EQ(run.error, "");
   ASSERT_TRUE(run.result.is_array());
   const Image drawn = picture_of(run.result, lens.render);
@@ -237,12 +235,12 @@ TEST(PageFallback, OfAnInexactSurfaceIsTheProgramsUntilAControlMoves) {
   view.surfaces.front().storage_error = 0.02;
   const testing::TempFolder folder;
   testing::write_bytes(folder / "view.html", view_page(view));
-  const PageRun run = testing::run_page(
-      folder / "view.html",
-      "await lensView.finished(); const error = lensView.error, "
-      "said = document.querySelector('[data-said]').textContent; "
-      "lensView.set('turn', 8); await lensView.finished(); "
-      "return { error, said, moved: Array.from(lensView.picture()) };");
+  const PageRun run =
+      testing::run_page(folder / "view.html",
+                        "await lensView.finished(); const error = lensView.error, "
+                        "said = document.querySelector('[data-said]').textContent; "
+                        "lensView.set('turn', 8); await lensView.finished(); "
+                        "return { error, said, moved: Array.from(lensView.picture()) };");
   EXPECT_EQ(run.error, "");
   ASSERT_TRUE(run.result.is_object());
   EXPECT_LT(run.result["error"].get<double>(), 1e-4);
