@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
@@ -42,7 +44,8 @@ nlohmann::json surfaces_json(const LensView& view) {
   for (const ViewedSurface& viewed : view.surfaces) {
     surfaces[viewed.id] = {{"vertices", viewed.surface.vertices},
                            {"triangles", viewed.surface.triangles},
-                           {"storage_mae", viewed.storage_error}};
+                           {"storage_mae", viewed.storage_error},
+                           {"exact", viewed.exact()}};
   }
   return surfaces;
 }
@@ -57,6 +60,19 @@ std::string summary_text(const LensView& view, const std::string& out, std::uint
   return text;
 }
 
+/// Warnings of surfaces whose stored light is not the program's.
+std::vector<std::string> warnings_of(const LensView& view) {
+  std::vector<std::string> warnings;
+  for (const ViewedSurface& viewed : view.surfaces) {
+    if (viewed.exact()) continue;
+    warnings.push_back("the surface " + viewed.words + " as stored in the page has MAE " +
+                       fixed(viewed.storage_error, 4) + " from the program's picture, more than " +
+                       fixed(kMaxStorageError, 3) +
+                       "; the page shows the program's picture until a control is moved");
+  }
+  return warnings;
+}
+
 CommandResult run(CommandFrame& frame, ViewSettings& settings) {
   require_page_name(settings.out);
   require_replaceable("--out", settings.out, settings.force);
@@ -66,11 +82,14 @@ CommandResult run(CommandFrame& frame, ViewSettings& settings) {
   const std::string page = view_page(view);
   frame.begin_writing();
   write_whole_file(settings.out, page);
+  std::vector<std::string> warnings = warnings_of(view);
   return {{{"source", settings.source},
            {"out", settings.out},
            {"bytes", page.size()},
            {"surfaces", surfaces_json(view)}},
-          summary_text(view, settings.out, page.size())};
+          summary_text(view, settings.out, page.size()),
+          exit_code(true, warnings.empty()),
+          std::move(warnings)};
 }
 
 Command<ViewSettings> command() {

@@ -33,9 +33,12 @@
 #include "core/lens/optical_surface.h"
 #include "core/lens/setup_json.h"
 #include "core/mesh/surface_mesh.h"
+#include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
+#include "core/spline/control_net.h"
+#include "core/spline/cubic_spline.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
@@ -45,113 +48,6 @@
 #include "view_files.h"
 
 namespace lensforge {
-namespace {
-
-/// Bytes per coordinate on a grid, an offset of a few cells: with 640 cells on 100 mm the error is
-/// 10 nm.
-constexpr int kPlaceBytes = 2;
-/// Bytes per coordinate on a mesh that is no grid.
-constexpr int kFreePlaceBytes = 3;
-/// Heights make the facets' slopes: 16 bits would move their light by tenths of a pixel.
-constexpr int kHeightBytes = 3;
-/// A slope of 0.3 is off by 5 µrad, which moves its light by less than 1 µm at 300 mm.
-constexpr int kSlopeBytes = 2;
-
-/// Numbers no farther apart, mm, are the same: x and y of an even grid differ by rounding.
-constexpr double kSame = 1e-9;
-
-/// Packs one number per vertex, relative to `base`, and replaces it by the decoded value.
-template <class Row, class Base>
-StoredChannel pack(const std::string& name, int bytes, Row row, const Base& base) {
-  StoredChannel channel{name, bytes, 0.0, 0.0, {}};
-  for (Eigen::Index v = 0; v < row.size(); ++v) {
-    const double value = row[v] - base(v);
-    channel.low = v == 0 ? value : std::min(channel.low, value);
-    channel.high = v == 0 ? value : std::max(channel.high, value);
-  }
-  if (channel.high - channel.low < kSame) {
-    channel.bytes = 0;
-    return channel;
-  }
-  PackedNumbers numbers(bytes);
-  for (Eigen::Index v = 0; v < row.size(); ++v) {
-    row[v] = base(v) + numbers.add(row[v] - base(v), channel.low, channel.high);
-  }
-  channel.text = numbers.text();
-  return channel;
-}
-
-void add_places(StoredSurface& stored, const Eigen::Vector2d& lens_size) {
-  SurfaceMesh& mesh = stored.read_back.mesh;
-  const GridShape& grid = mesh.grid;
-  for (int axis = 0; axis < 2; ++axis) {
-    const auto even = [&](Eigen::Index v) {
-      if (!grid.is_grid()) return 0.0;
-      const Eigen::Index at = axis == 0 ? v % grid.columns : v / grid.columns;
-      const int cells = (axis == 0 ? grid.columns : grid.rows) - 1;
-      return lens_size[axis] * static_cast<double>(at) / cells;
-    };
-    const int bytes = grid.is_grid() ? kPlaceBytes : kFreePlaceBytes;
-    stored.channels.push_back(pack(axis == 0 ? "x" : "y", bytes, mesh.vertices.row(axis), even));
-  }
-}
-
-void add_slopes(StoredSurface& stored, const Eigen::Matrix3Xd& normals) {
-  Eigen::Matrix3Xd& kept = stored.read_back.normals;
-  kept = -normals.cwiseQuotient(normals.row(2).replicate(3, 1));
-  const auto zero = [](Eigen::Index) { return 0.0; };
-  stored.channels.push_back(pack("slope_x", kSlopeBytes, kept.row(0), zero));
-  stored.channels.push_back(pack("slope_y", kSlopeBytes, kept.row(1), zero));
-  kept = -kept;
-}
-
-/// Vertex numbers as little-endian 32-bit numbers.
-std::string packed_corners(const SurfaceMesh& mesh) {
-  std::vector<unsigned char> bytes;
-  for (const int number : mesh.triangles.reshaped()) {
-    for (unsigned k = 0; k < 4; ++k) {
-      bytes.push_back(static_cast<unsigned char>(static_cast<std::uint32_t>(number) >> (8U * k)));
-    }
-  }
-  return base64(bytes);
-}
-
-/// Records the grid's triangulation, or stores the triangles.
-void add_triangles(StoredSurface& stored, const SurfaceMesh& mesh) {
-  if (mesh.grid.is_grid()) {
-    if (mesh.triangles == grid_triangles(mesh.grid)) return;
-    stored.zigzag = mesh.triangles == make_grid_mesh({1.0, 1.0}, mesh.grid, 0.0).triangles;
-  }
-  if (!stored.zigzag) stored.corners = packed_corners(mesh);
-}
-
-}  // namespace
-
-double StoredChannel::step() const {
-  return bytes == 0 ? 0.0 : (high - low) / (std::ldexp(1.0, 8 * bytes) - 1.0);
-}
-
-const StoredChannel* StoredSurface::channel(const std::string& name) const {
-  const auto found = std::find_if(channels.begin(), channels.end(),
-                                  [&](const StoredChannel& c) { return c.name == name; });
-  return found == channels.end() ? nullptr : &*found;
-}
-
-StoredSurface store_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
-                            const Eigen::Vector2d& lens_size) {
-  StoredSurface stored;
-  stored.grid = mesh.grid;
-  stored.vertices = mesh.vertex_count();
-  stored.triangles = mesh.triangle_count();
-  stored.read_back.mesh = mesh;
-  add_places(stored, lens_size);
-  const auto zero = [](Eigen::Index) { return 0.0; };
-  stored.channels.push_back(pack("z", kHeightBytes, stored.read_back.mesh.vertices.row(2), zero));
-  if (normals.cols() > 0) add_slopes(stored, normals);
-  add_triangles(stored, mesh);
-  return stored;
-}
-
 namespace {
 
 namespace fs = std::filesystem;
@@ -167,8 +63,8 @@ struct CutForecast {
   /// In order: the surface between the vertices, which the design's picture ignores, polish, …; the
   /// last is the part's.
   std::vector<CausePicture> causes;
-  SampledSurface polished;       ///< As designed, but polished.
-  SampledSurface part;           ///< Cut and polished.
+  ControlNet polished;           ///< As designed, but polished.
+  ControlNet part;               ///< Cut and polished.
   std::string leakage_map;       ///< Bytes of a PNG.
   std::vector<ReportPath> path;  ///< Finishing paths; empty for a mould, which has another frame.
   std::string note;              ///< Reason for which a cut has none; else empty.
@@ -178,7 +74,7 @@ struct CutForecast {
 
 /// Maximum size of report.json, which has about 30 kB.
 constexpr std::uintmax_t kMaxReportBytes = std::uintmax_t{16} << 20U;
-/// Maximum size of leakage.png.
+/// Maximum size of a picture that is copied into the page.
 constexpr std::uintmax_t kMaxMapBytes = std::uintmax_t{64} << 20U;
 /// Between the points of a path that is shown, mm.
 constexpr double kPathSpacing = 0.5;
@@ -187,29 +83,41 @@ constexpr double kPathSpacing = 0.5;
   throw InputError(file.string() + ": " + rule + "; run cam again");
 }
 
-/// A surface of part.exr as a grid of nodes with normals.
-SampledSurface surface_of(const LayeredImage& layers, const std::string& name,
-                          const Eigen::Vector2d& size, const fs::path& file) {
-  for (const char* layer : {".z", ".slope_x", ".slope_y"}) {
-    if (!layers.has(name + layer)) refuse(file, "has no layer " + name + layer);
-  }
-  const GridShape shape{layers.columns(), layers.rows()};
-  if (shape.columns < 2 || shape.rows < 2) refuse(file, "is too small");
-  SampledSurface surface = make_samples(shape);
+/// Coefficients along a line of heights (HeightSpline) as those of the same spline with fourfold
+/// knots at its ends (ControlNet), by its blossom.
+void clamp_ends(Eigen::Ref<Eigen::VectorXd, 0, Eigen::InnerStride<>> c) {
+  const Eigen::Index n = c.size();
+  const double first = (c[0] + 4.0 * c[1] + c[2]) / 6.0;
+  const double last = (c[n - 1] + 4.0 * c[n - 2] + c[n - 3]) / 6.0;
+  c[1] = (2.0 * c[1] + c[2]) / 3.0;
+  c[n - 2] = (2.0 * c[n - 2] + c[n - 3]) / 3.0;
+  c[0] = first;
+  c[n - 1] = last;
+}
+
+/// A surface of part.exr as the spline through its nodes.
+ControlNet surface_of(const LayeredImage& layers, const std::string& name,
+                      const Eigen::Vector2d& size, const fs::path& file) {
+  if (!layers.has(name + ".z")) refuse(file, "has no layer " + name + ".z");
+  if (std::min(layers.columns(), layers.rows()) < kMinHeightSamples) refuse(file, "is too small");
   const auto z = layers.layer(name + ".z");
-  const auto slope_x = layers.layer(name + ".slope_x");
-  const auto slope_y = layers.layer(name + ".slope_y");
-  for (int row = 0; row < shape.rows; ++row) {
-    for (int column = 0; column < shape.columns; ++column) {
-      const auto from =
-          static_cast<std::size_t>(Eigen::Index{shape.rows - 1 - row} * shape.columns + column);
-      const Eigen::Index to = Eigen::Index{row} * shape.columns + column;
-      surface.mesh.vertices.col(to) << size.x() * column / (shape.columns - 1),
-          size.y() * row / (shape.rows - 1), z[from];
-      surface.normals.col(to) << -slope_x[from], -slope_y[from], 1.0;
+  const HeightSpline spline(HeightGrid{layers.columns(), layers.rows(), {z.begin(), z.end()}});
+  const Eigen::Vector2i cells(layers.columns() - 1, layers.rows() - 1);
+  ControlNet net{{cells.x() + 3, cells.y() + 3}, {}};
+  net.points.resize(3, Eigen::Index{net.shape.columns} * net.shape.rows);
+  for (int j = 0; j < net.shape.rows; ++j) {
+    for (int i = 0; i < net.shape.columns; ++i) {
+      net.points.col(Eigen::Index{j} * net.shape.columns + i)
+          << size.x() * greville_point(i, cells.x()) / cells.x(),
+          size.y() * greville_point(j, cells.y()) / cells.y(), spline.coefficient(i - 1, j - 1);
     }
   }
-  return surface;
+  Eigen::Map<Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, 3>> heights(
+      net.points.data() + 2, net.shape.columns, net.shape.rows,
+      {Eigen::Index{3} * net.shape.columns, 3});
+  for (Eigen::Index j = 0; j < heights.cols(); ++j) clamp_ends(heights.col(j));
+  for (Eigen::Index i = 0; i < heights.rows(); ++i) clamp_ends(heights.row(i).transpose());
+  return net;
 }
 
 Image picture_of(const LayeredImage& layers, const std::string& name) {
@@ -312,19 +220,18 @@ CutForecast read_forecast(const fs::path& lens_folder, const Lens& lens,
   return forecast;
 }
 
-/// Nodes of a spline at most: more would not fit a page of 25 MB.
-constexpr double kMaxNodes = 480e3;
+/// Approximate number of nodes that a page draws of a spline, if two per cell are not more.
+constexpr double kViewNodes = 480e3;
 /// Samples of a height map, 4 bytes each in a page.
 constexpr std::size_t kMaxHeights = 1'000'000;
 
-/// The surface with the normals that send its light: none of facets.
-SampledSurface surface_of(const Lens& lens) {
+StoredSurface stored_design(const Lens& lens) {
   if (lens.spline) {
     const auto cells = static_cast<double>(lens.spline->cell_count());
-    return spline_nodes(*lens.spline, samples_for(kMaxNodes, cells));
+    return store_spline(*lens.spline, samples_for(kViewNodes, cells), lens.setup);
   }
-  if (lens.model == SurfaceModel::kFacet) return {lens.surface, {}};
-  return {lens.surface, vertex_area_normals(lens.surface)};
+  if (lens.model == SurfaceModel::kFacet) return store_surface(lens.surface, {}, lens.setup);
+  return store_surface(lens.surface, vertex_area_normals(lens.surface), lens.setup);
 }
 
 /// The picture of a surface as stored against the program's own.
@@ -339,7 +246,7 @@ double storage_error(const SampledSurface& stored, const OpticalSetup& setup, co
   return compare(drawn, picture).mae;
 }
 
-/// @throw InputError if a height map would not fit a page of 25 MB beside the surfaces.
+/// @throw InputError if a height map would not fit a page of 15 MB beside the surfaces.
 void require_small_front(const OpticalSetup& setup, const std::string& name) {
   const auto* const map = setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
   if (map == nullptr || map->spline->coefficients().size() <= kMaxHeights) return;
@@ -348,13 +255,19 @@ void require_small_front(const OpticalSetup& setup, const std::string& name) {
 }
 
 /// A surface with the picture that the program has of it.
-ViewedSurface viewed(const std::string& id, const std::string& words, const SampledSurface& surface,
+ViewedSurface viewed(const std::string& id, const std::string& words, StoredSurface stored,
                      Image picture, const Lens& lens, const Executor& executor) {
-  ViewedSurface result{id, words, {}, std::move(picture), 0.0};
-  result.surface = store_surface(surface.mesh, surface.normals, lens.setup.lens_size);
+  ViewedSurface result{id, words, std::move(stored), std::move(picture), 0.0};
   result.storage_error =
       storage_error(result.surface.read_back, lens.setup, lens.target, result.picture, executor);
+  result.surface.read_back = {};  // Several hundred megabytes that nothing else needs.
   return result;
+}
+
+/// A surface of a part, drawn at its spline's knots.
+ViewedSurface viewed_part(const std::string& id, const std::string& words, const ControlNet& net,
+                          const Image& picture, const Lens& lens, const Executor& executor) {
+  return viewed(id, words, store_spline(net, 1, lens.setup), picture, lens, executor);
 }
 
 /// Adds the surfaces of a part, and what each cause makes of the picture.
@@ -365,10 +278,10 @@ void add_forecast(const fs::path& folder, const Lens& lens, const Executor& exec
     view.notes.push_back((folder / lens_file::kCut).string() + ": " + forecast.note);
   }
   if (forecast.empty()) return;
-  view.surfaces.push_back(viewed("polished", "only polished", forecast.polished,
-                                 forecast.causes[1].picture, lens, executor));
-  view.surfaces.push_back(viewed("part", "cut and polished", forecast.part,
-                                 forecast.causes.back().picture, lens, executor));
+  view.surfaces.push_back(viewed_part("polished", "only polished", forecast.polished,
+                                      forecast.causes[1].picture, lens, executor));
+  view.surfaces.push_back(viewed_part("part", "cut and polished", forecast.part,
+                                      forecast.causes.back().picture, lens, executor));
   for (CausePicture& cause : forecast.causes) {
     view.causes.push_back({std::move(cause.cause), "", std::move(cause.picture)});
   }
@@ -376,6 +289,23 @@ void add_forecast(const fs::path& folder, const Lens& lens, const Executor& exec
   view.causes.back().surface = "part";
   view.path = std::move(forecast.path);
   view.leakage_map = std::move(forecast.leakage_map);
+}
+
+/// Adds the pictures by waves of a lens and of its part, where the folder has them.
+void add_waves(const fs::path& folder, const RunControl& control, LensView& view) {
+  std::error_code none;
+  const auto add = [&](const fs::path& file, const std::string& words) {
+    if (fs::exists(file, none)) view.waves.push_back({words, read_whole_file(file, kMaxMapBytes)});
+    if (control.stop_requested()) throw Interrupted();
+  };
+  add(folder / lens_file::kWall, "as designed");
+  const fs::path report = folder / lens_file::kCut / cam_file::kReport;
+  if (!fs::exists(report, none)) return;
+  // Without waves, the part's wall.png is by rays.
+  const nlohmann::json document =
+      parse_json(read_whole_file(report, kMaxReportBytes), report.string());
+  if (document.contains("waves"))
+    add(folder / lens_file::kCut / cam_file::kWall, "cut and polished");
 }
 
 LensRaster relief_of(const Lens& lens) {
@@ -398,6 +328,8 @@ LensRaster relief_of(const Lens& lens) {
 
 }  // namespace
 
+bool ViewedSurface::exact() const { return storage_error <= kMaxStorageError; }
+
 LensView view_of_lens(const Lens& lens, const std::string& name, const Executor& executor) {
   require_small_front(lens.setup, name);
   LensView view;
@@ -406,7 +338,7 @@ LensView view_of_lens(const Lens& lens, const std::string& name, const Executor&
   view.model = model_name(lens.model);
   view.target = lens.target;
   view.surfaces.push_back(
-      viewed("designed", "as designed", surface_of(lens), lens.render, lens, executor));
+      viewed("designed", "as designed", stored_design(lens), lens.render, lens, executor));
   view.causes.push_back({"the design", "designed", lens.render});
   view.relief = relief_of(lens);
   return view;
@@ -421,6 +353,7 @@ LensView read_view(const fs::path& folder, const Executor& executor, const RunCo
   control.report({"picture", 0.0, 0.0, ""});
   LensView view = view_of_lens(lens, fs::weakly_canonical(folder).filename().string(), executor);
   add_forecast(folder, lens, executor, control, view);
+  add_waves(folder, control, view);
   if (control.stop_requested()) throw Interrupted();
   return view;
 }
@@ -434,9 +367,6 @@ constexpr const char* kPolicy =
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
     "style-src 'unsafe-inline'; script-src 'unsafe-inline'\">";
 
-/// Passes of a picture, each moved by a part of a sample: MAE of a 64² portrait against the
-/// program's own picture 0.0009.
-constexpr int kPasses = 16;
 /// Bytes per display-encoded value; error below 1e-5.
 constexpr int kPictureBytes = 2;
 /// Of a height map's coefficient: a sixteen-millionth of its depth, or of that of a flat one, mm.
@@ -454,12 +384,12 @@ class PageData {
     elements_ += data_element(id, "text/plain", text);
     return id;
   }
+  json numbers(int bytes, double low, double high, const std::string& text) {
+    return {{"bytes", bytes}, {"low", low}, {"high", high}, {"element", add(text)}};
+  }
   json channel(const StoredChannel& channel) {
-    return {{"name", channel.name},
-            {"bytes", channel.bytes},
-            {"low", channel.low},
-            {"high", channel.high},
-            {"element", add(channel.text)}};
+    return {{"name", channel.name}, {"columns", channel.columns}, {"rows", channel.rows},
+            {"low", channel.low},   {"step", channel.step},       {"element", add(channel.text)}};
   }
   json picture(const Image& image) {
     const auto values = image.values();
@@ -470,7 +400,7 @@ class PageData {
     for (const float value : values) numbers.add(encode(value), 0.0, high);
     return {{"columns", image.columns()},
             {"rows", image.rows()},
-            {"values", channel({"light", kPictureBytes, 0.0, high, numbers.text()})}};
+            {"values", this->numbers(kPictureBytes, 0.0, high, numbers.text())}};
   }
   /// Coefficients of a front that is a height map, else null.
   json front(const OpticalSetup& setup) {
@@ -483,7 +413,7 @@ class PageData {
     for (const double value : values) numbers.add(value, *low, above);
     return {{"columns", map->spline->grid().columns},
             {"rows", map->spline->grid().rows},
-            {"values", channel({"heights", kCoefficientBytes, *low, above, numbers.text()})}};
+            {"values", this->numbers(kCoefficientBytes, *low, above, numbers.text())}};
   }
   json surface(const ViewedSurface& viewed) {
     const StoredSurface& stored = viewed.surface;
@@ -491,13 +421,16 @@ class PageData {
     for (const StoredChannel& one : stored.channels) channels.push_back(channel(one));
     return {{"id", viewed.id},
             {"words", viewed.words},
-            {"facets", stored.channel("slope_x") == nullptr},
+            {"exact", viewed.exact()},
+            {"error", viewed.storage_error},
+            {"spline", stored.spline},
+            {"samples", stored.samples},
+            {"facets", !stored.spline && stored.channel("slope_x") == nullptr},
             {"columns", stored.grid.columns},
             {"rows", stored.grid.rows},
             {"vertices", stored.vertices},
             {"triangles", stored.triangles},
             {"zigzag", stored.zigzag},
-            {"corners", stored.corners.empty() ? json(nullptr) : json(add(stored.corners))},
             {"channels", channels}};
   }
 
@@ -520,7 +453,6 @@ std::string data_of(const LensView& view) {
            {"front", data.front(view.setup)},
            {"abbe", Dispersion{}.abbe},
            {"white", view.target.total() / pixels},
-           {"passes", kPasses},
            {"colors", colors()},
            {"target", data.picture(view.target)},
            {"surfaces", json::array()},
@@ -566,12 +498,14 @@ std::string leakage_figure(const LensView& view) {
 
 std::string nanometre_text(double mm) { return decimal_text(1e6 * mm, 2) + " nm"; }
 
-/// Describes the error of a surface stored in few bytes.
+/// Describes the error of a stored surface.
 std::string storage_words(const ViewedSurface& viewed) {
   const StoredSurface& stored = viewed.surface;
-  std::string words = "heights to ± " + nanometre_text(0.5 * stored.channel("z")->step());
+  std::string words = count_text(stored.vertices) + " vertices" +
+                      (stored.spline ? " of a spline" : "") + ", heights to ± " +
+                      nanometre_text(0.5 * stored.channel("z")->step);
   if (const StoredChannel* slope = stored.channel("slope_x")) {
-    const double step = std::max(slope->step(), stored.channel("slope_y")->step());
+    const double step = std::max(slope->step, stored.channel("slope_y")->step);
     words += ", normals to ± " + decimal_text(1e6 * 0.5 * step, 2) + " µrad";
   }
   return words + ": its picture changes by MAE " + decimal_text(viewed.storage_error, 6);
@@ -580,19 +514,38 @@ std::string storage_words(const ViewedSurface& viewed) {
 std::string facts(const LensView& view) {
   std::vector<NamedText> facts;
   for (const ViewedSurface& viewed : view.surfaces) {
-    facts.push_back({"Surface " + viewed.words,
-                     count_text(viewed.surface.vertices) + " vertices, " + storage_words(viewed)});
+    facts.push_back({"Surface " + viewed.words, storage_words(viewed)});
   }
   facts.push_back({"What is drawn",
-                   "the image triangles of the surface, each with its flux over its area, summed "
-                   "over " +
-                       std::to_string(kPasses) +
-                       " passes and, of an extended source, its "
-                       "points"});
+                   "the image triangles of the surface: of each one, every pixel gets the light "
+                   "that falls on it; of an extended source, the mean over its points"});
   facts.push_back({"Keys",
                    "Tab moves between controls, arrows change them; on the picture arrows move "
                    "the mark and Shift makes ten pixels of it"});
   return html_facts(facts);
+}
+
+/// Says which model of light the page has.
+std::string model_words(const LensView& view) {
+  std::string words = "This page computes light by rays, without diffraction";
+  words += view.waves.empty() ? "." : "; the program's pictures by waves are below.";
+  return element("p", "class=\"model\"", words);
+}
+
+std::string wave_figures(const LensView& view) {
+  std::string html;
+  for (const WavePicture& wave : view.waves) {
+    const std::vector<unsigned char> png(wave.png.begin(), wave.png.end());
+    html += element("figure", "",
+                    element("div", "class=\"shade\"",
+                            "<img data-waves src=\"data:image/png;base64," + base64(png) +
+                                "\" alt=\"Picture by waves\">") +
+                        element("figcaption", "",
+                                "<b>By waves</b> " + escape_html(wave.words) +
+                                    ": the program's picture with diffraction; "
+                                    "controls do not change it"));
+  }
+  return html;
 }
 
 std::string size_words(const Eigen::Vector2d& size) {
@@ -614,14 +567,17 @@ std::string lens_section(const LensView& view) {
   data.surface = view.relief;
   data.lens_size = view.setup.lens_size;
   data.path = view.path;
+  data.path_shown = false;  // It would hide the relief.
   return surface_view_html(data);
 }
 
 std::string body(const LensView& view) {
   const std::string pictures = stored_pictures(view);
-  const std::array<std::pair<std::string_view, std::string>, 5> values{
+  const std::array<std::pair<std::string_view, std::string>, 7> values{
       {{"RELIEF", png_uri(relief_picture(view.relief, view.setup.lens_size))},
        {"LEAKAGE", leakage_figure(view)},
+       {"MODEL", model_words(view)},
+       {"WAVES", wave_figures(view)},
        {"LENS", lens_section(view)},
        {"PICTURES", pictures},
        {"FACTS", facts(view)}}};

@@ -7,48 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "app/view/stored_surface.h"
 #include "cam/report/report_data.h"
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/lens/lens.h"
-#include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {
-
-/// One number per vertex, stored as PackedNumbers.
-struct StoredChannel {
-  std::string name;  ///< "x", "y", "z", "slope_x", "slope_y"
-  int bytes = 0;     ///< Bytes per number; 0 if all are `low`.
-  double low = 0.0;
-  double high = 0.0;
-  std::string text;  ///< Base 64.
-
-  /// Resolution of the stored numbers, in the channel's unit.
-  [[nodiscard]] double step() const;
-};
-
-/// A surface as stored in a page: numbers of a few bytes.
-///
-/// On a grid, x and y are offsets from the vertices of an even grid over the lens; 16 bits then
-/// resolve far less than a micrometre.
-struct StoredSurface {
-  GridShape grid;  ///< {0, 0} if the mesh is no grid.
-  std::int64_t vertices = 0;
-  std::int64_t triangles = 0;
-  std::vector<StoredChannel> channels;
-  /// Vertex numbers of the triangles, 32 bits each, base 64; empty if they follow from the grid.
-  std::string corners;
-  bool zigzag = false;       ///< The diagonals alternate from row to row (make_grid_mesh()).
-  SampledSurface read_back;  ///< As a page decodes it; without normals if there are no slopes.
-
-  [[nodiscard]] const StoredChannel* channel(const std::string& name) const;
-};
-
-/// @param normals  3 × V with z > 0, of any length; without columns the triangles' own normals are
-///        used.
-StoredSurface store_surface(const SurfaceMesh& mesh, const Eigen::Matrix3Xd& normals,
-                            const Eigen::Vector2d& lens_size);
 
 /// A surface whose projected picture a page draws.
 struct ViewedSurface {
@@ -58,6 +24,18 @@ struct ViewedSurface {
   Image picture;  ///< The picture it projects, computed by the program; linear light.
   /// MAE between that picture and the one of the stored surface, both computed by the program.
   double storage_error = 0.0;
+
+  /// True if a page draws it; else it shows `picture` until a control is moved.
+  [[nodiscard]] bool exact() const;
+};
+
+/// Maximum error of a stored surface that a page draws: one sees a quarter of a grey level of 256.
+inline constexpr double kMaxStorageError = 1e-3;
+
+/// A picture that a wave makes, as the program has stored it.
+struct WavePicture {
+  std::string words;  ///< "as designed"
+  std::string png;    ///< Bytes of the file.
 };
 
 /// The picture after one cause of error.
@@ -74,6 +52,7 @@ struct LensView {
   std::string model;                    ///< model_name()
   Image target;                         ///< Linear light.
   std::vector<ViewedSurface> surfaces;  ///< The designed one comes first.
+  std::vector<WavePicture> waves;       ///< Of the folder, if design or cam followed waves.
   /// The causes of error between target and part, step by step, and the surface for each.
   std::vector<ViewedCause> causes;
   LensRaster relief;               ///< Heights of the designed surface, mm.

@@ -151,42 +151,39 @@ namespace {
 /// Rounding allowed in quotients, so that whole ones do not cost a cell.
 constexpr double kRounding = 1e-9;
 
+std::string layer_of(const std::string& surface) { return surface + ".z"; }
+
 /// Keeps the nodes of one tile.
 void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
                 const Executor& executor, LayeredImage& layers) {
-  const std::array values{&patch.z, &patch.slope_x, &patch.slope_y};
-  const std::array names{".z", ".slope_x", ".slope_y"};
   const GridWindow& window = patch.window;
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    const auto layer = layers.layer(name + names[k]);
-    const auto keep_row = [&](std::int64_t j) {
-      const std::int64_t row = window.first_row + j;
-      if (row % grid.every.y() != 0) return;
-      const std::int64_t from_top = grid.nodes.y() - 1 - row / grid.every.y();
-      for (std::int64_t i = 0; i < window.columns; ++i) {
-        const std::int64_t column = window.first_column + i;
-        if (column % grid.every.x() != 0) continue;
-        const std::int64_t at = from_top * grid.nodes.x() + column / grid.every.x();
-        layer[static_cast<std::size_t>(at)] =
-            static_cast<float>((*values[k])[static_cast<std::size_t>(j * window.columns + i)]);
-      }
-    };
-    parallel_for(executor, "keep surface", window.rows, keep_row, 16);
-  }
+  const auto layer = layers.layer(layer_of(name));
+  const auto keep_row = [&](std::int64_t j) {
+    const std::int64_t row = window.first_row + j;
+    if (row % grid.every.y() != 0) return;
+    const std::int64_t from_top = grid.nodes.y() - 1 - row / grid.every.y();
+    for (std::int64_t i = 0; i < window.columns; ++i) {
+      const std::int64_t column = window.first_column + i;
+      if (column % grid.every.x() != 0) continue;
+      const std::int64_t at = from_top * grid.nodes.x() + column / grid.every.x();
+      layer[static_cast<std::size_t>(at)] =
+          static_cast<float>(patch.z[static_cast<std::size_t>(j * window.columns + i)]);
+    }
+  };
+  parallel_for(executor, "keep surface", window.rows, keep_row, 16);
 }
 
 std::vector<std::string> layer_names(const std::vector<NamedSurface>& surfaces) {
   std::vector<std::string> names;
-  for (const NamedSurface& surface : surfaces) {
-    for (const char* layer : {".z", ".slope_x", ".slope_y"}) names.push_back(surface.name + layer);
-  }
+  names.reserve(surfaces.size());
+  for (const NamedSurface& surface : surfaces) names.push_back(layer_of(surface.name));
   return names;
 }
 
 }  // namespace
 
 PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most) {
-  const double coarse = std::sqrt(lens_size.prod() / most);
+  const double coarse = std::max(kPartSpacing, std::sqrt(lens_size.prod() / most));
   PartGrid grid;
   for (int axis = 0; axis < 2; ++axis) {
     // A spacing that divides the pitch should stay so: use as many cells as it requires if their

@@ -115,8 +115,12 @@ inline constexpr const char* kPolished = "polished";  ///< As designed, but poli
 inline constexpr const char* kPart = "part";          ///< Cut and polished.
 }  // namespace part_layer
 
-/// Approximate number of nodes of a surface in part.exr: the limit for a page of 25 MB.
-inline constexpr double kPartNodes = 4e5;
+/// Approximate maximum number of nodes of a surface in part.exr: more would not fit a page of 15
+/// MB.
+inline constexpr double kPartNodes = 6.3e6;
+/// Minimum spacing of these nodes, mm. A 64² portrait's part, polished with σ = 30 µm, has an error
+/// of MAE 0.0005 with nodes every 0.01 × 0.03 mm and 0.0022 with 0.03 × 0.03 mm.
+inline constexpr double kPartSpacing = 0.01;
 
 /// The nodes of a surface's layers: columns and rows, evenly over the lens, and the cells of the
 /// sampled grid between two of them.
@@ -133,9 +137,8 @@ PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spac
 /// part_grid() with kPartNodes.
 GridWindow sampled_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings);
 
-/// Heights, mm, and slopes of surfaces as layers "NAME.z", "NAME.slope_x" and "NAME.slope_y", at
-/// nodes evenly over the lens, the upper left one first, taken from the tiles sampled for the
-/// surfaces' pictures.
+/// Heights of surfaces, mm, as layers "NAME.z" at nodes evenly over the lens, the upper left one
+/// first, taken from the tiles sampled for the surfaces' pictures.
 class PartLayers {
  public:
   /// @param spacings  as of sampled_grid(), whose tiles are taken.

@@ -193,6 +193,7 @@ struct ReportData {
   LensRaster surface;            ///< Heights of the part, mm, for the view.
   std::vector<ReportMap> maps;   ///< Height, fillet, …
   std::vector<ReportPath> path;  ///< For the view.
+  bool path_shown = true;        ///< The view shows the last path at first.
   std::vector<ReportChoice> choices;
 
   [[nodiscard]] double minutes() const;

@@ -296,19 +296,19 @@ std::string path_box(const ReportPath& path, std::size_t number, bool shown) {
                      (path.every > 1 ? ", one pass in " + std::to_string(path.every) : ""));
 }
 
-/// Enlargement of height with which the relief is about a seventh of the lens's side.
+/// Enlargement of height with which the relief is about a quarter of the lens's side.
 long first_raise(const ReportData& data) {
   const auto [low, high] =
       std::minmax_element(data.surface.values.begin(), data.surface.values.end());
   const double relief = std::max(1e-6, static_cast<double>(*high) - static_cast<double>(*low));
-  return std::lround(std::clamp(data.lens_size.maxCoeff() / (7.0 * relief), 1.0, 30.0));
+  return std::lround(std::clamp(data.lens_size.maxCoeff() / (4.0 * relief), 1.0, 30.0));
 }
 
 std::string controls(const ReportData& data) {
   std::string html = "<button type=\"button\" data-reset>Reset view</button>";
   html += "<label><input type=\"checkbox\" data-surface checked>surface</label>";
   for (std::size_t k = 0; k < data.path.size(); ++k) {
-    html += path_box(data.path[k], k, k + 1 == data.path.size());
+    html += path_box(data.path[k], k, data.path_shown && k + 1 == data.path.size());
   }
   html += "<label><input type=\"range\" data-raise min=\"1\" max=\"30\" value=\"" +
           std::to_string(first_raise(data)) +

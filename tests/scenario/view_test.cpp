@@ -3,6 +3,7 @@
 #include "app/view/browser.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
+#include "core/image/rasters.h"
 #include "core/image/transfer.h"
 #include "scenario/driver.h"
 
@@ -124,11 +125,23 @@ TEST_F(View, ShowsTheForecastOfThePartAndTheCauseAtASpot) {
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const nlohmann::json surfaces = made.json()["surfaces"];
   EXPECT_EQ(surfaces.size(), 3U);
-  EXPECT_LT(surfaces["designed"]["storage_mae"].get<double>(), 1e-3);
+  for (const auto& [id, surface] : surfaces.items()) {
+    EXPECT_LT(surface["storage_mae"].get<double>(), 1e-3) << id;
+    EXPECT_TRUE(surface["exact"].get<bool>()) << id;
+  }
+  EXPECT_LT(made.json()["bytes"].get<double>(), 15e6);
   const Image forecast = read_image(at("lens/cam/milled.png")).image;
   const auto pictures = drawn({"view.set('surface', 'part');", ""});
   EXPECT_LT(mae(pictures[0], forecast), 0.01);
   EXPECT_LT(mae(pictures[0], forecast), 0.7 * mae(pictures[1], forecast));
+
+  const PageRun errors = testing::run_page(at("view.html"),
+                                           "const view = window.lensView, errors = []; for (const "
+                                           "id of ['designed', 'polished', 'part']) "
+                                           "{ view.set('surface', id); await view.finished(); "
+                                           "errors.push(view.error); } return errors;");
+  ASSERT_TRUE(errors.result.is_array()) << errors.error;
+  for (const auto& error : errors.result) EXPECT_LT(error.get<double>(), 1e-3);
 
   const PageRun marked = testing::run_page(
       at("view.html"),
@@ -140,6 +153,45 @@ TEST_F(View, ShowsTheForecastOfThePartAndTheCauseAtASpot) {
   EXPECT_EQ(marked.result["causes"][0][0], "the design");
   EXPECT_EQ(marked.result["causes"][2][0], "polish");
   EXPECT_THAT(marked.result["text"].get<std::string>(), HasSubstr("leaves the lens at x "));
+}
+
+/// Every so many nodes of a raster, each way, the last one included. @pre `every` divides it.
+LayeredImage thinned(const LayeredImage& fine, int every) {
+  LayeredImage coarse((fine.columns() - 1) / every + 1, (fine.rows() - 1) / every + 1,
+                      fine.names());
+  for (const std::string& name : fine.names()) {
+    for (int row = 0; row < coarse.rows(); ++row) {
+      for (int column = 0; column < coarse.columns(); ++column) {
+        const std::size_t from =
+            static_cast<std::size_t>(row * every) * static_cast<std::size_t>(fine.columns()) +
+            static_cast<std::size_t>(column * every);
+        const std::size_t to =
+            static_cast<std::size_t>(row) * static_cast<std::size_t>(coarse.columns()) +
+            static_cast<std::size_t>(column);
+        coarse.layer(name)[to] = fine.layer(name)[from];
+      }
+    }
+  }
+  return coarse;
+}
+
+TEST_F(View, SaysSoWhereThePartIsStoredTooCoarsely) {
+  cut();
+  write_layers(thinned(read_layers(at("lens/cam/part.exr")), 20), at("lens/cam/part.exr"));
+  const Outcome made = page();
+  EXPECT_EQ(made.exit_code, 3) << made.err;
+  EXPECT_THAT(made.err, HasSubstr("the page shows the program's picture until a control is moved"));
+  EXPECT_FALSE(made.json()["surfaces"]["part"]["exact"].get<bool>());
+  EXPECT_TRUE(made.json()["surfaces"]["designed"]["exact"].get<bool>());
+}
+
+TEST_F(View, SaysWhichModelItHasAndShowsThePicturesByWavesThatThereAre) {
+  ASSERT_EQ(page().exit_code, 0);
+  EXPECT_THAT(content(at("view.html")), HasSubstr("computes light by rays, without diffraction.<"));
+  fs::copy_file(at("lens/render.png"), at("lens/wall.png"));
+  ASSERT_EQ(page().exit_code, 0);
+  EXPECT_THAT(content(at("view.html")), HasSubstr("the program's pictures by waves are below."));
+  EXPECT_THAT(content(at("view.html")), HasSubstr("<img data-waves"));
 }
 
 TEST_F(View, FitsAWindowThatGetsNarrowerAsAPhoneThatIsTurned) {

@@ -3,8 +3,24 @@
 
 const sliders = new Map();
 
+// Refuses what does not exist, in one sentence.
+function requireSetting(name, value) {
+  const names = (list) => list.join(", ");
+  const quoted = (text) => JSON.stringify(String(text));
+  if (!Object.hasOwn(settings, name)) {
+    throw new Error(`This page has no setting ${quoted(name)}; it has ${names(Object.keys(settings))}.`);
+  }
+  const surfaces = data.surfaces.map((surface) => surface.id);
+  if (name === "surface" && !surfaces.includes(value)) {
+    throw new Error(`This page has no surface ${quoted(value)}; it has ${names(surfaces)}.`);
+  }
+  if (name !== "surface" && (typeof value !== "number" || Number.isNaN(value))) {
+    throw new Error(`The setting ${name} must be a number, not ${quoted(value)}.`);
+  }
+}
+
 function set(name, value) {
-  if (!(name in settings)) throw new Error(`no setting ${name}`);
+  requireSetting(name, value);
   settings[name] = value;
   refresh();
   if (kOnlyShown.has(name)) ask();

@@ -60,28 +60,44 @@ function showPlain(why) {
 const projector = lacking ? null : new Projector(find("wall"), gl, optics.pixels, data.front);
 const decoded = new Map();
 const shownOf = () => data.surfaces.find((surface) => surface.id === settings.surface);
-let points = [], total = 0, each = 1, asked = false, waiting = [], drawn = null, swing = null;
+let points = [], total = 0, each = 1, asked = false, waiting = [], drawn = null, swing = null, begun = 0;
 
+// Surfaces are unpacked when they are first shown; a promise.
 function chosenSurface() {
   const stored = shownOf();
   if (!decoded.has(stored.id)) decoded.set(stored.id, decodeSurface(stored, data.setup.lens_size));
   return decoded.get(stored.id);
 }
+const asDesigned = () => Object.keys(kDefaults).every((name) =>
+  kOnlyShown.has(name) || name === "surface" || settings[name] === kDefaults[name]);
+// The program's own picture of the surface that is shown.
+const programsPicture = () => pictureOf(stepsTo(settings.surface).pop().picture);
+// True if the page shows the program's picture because its own would differ too much.
+const onlyStored = () => asDesigned() && !swing && !shownOf().exact;
 
 function halves() {
   return optics.size.map((size) => 0.5 * size * settings.screenSize);
 }
 
-function begin() {
-  const surface = chosenSurface();
+// The program's picture is shown until the page's own is drawn.
+async function begin() {
+  const turn = ++begun;
+  drawn = null;
+  total = 0;
+  projector.keep(asDesigned() && !swing ? programsPicture() : null);
+  if (projector.still) ask();
+  if (onlyStored()) return;
+  const surface = await chosenSurface();
+  if (projector.still) await shown();
+  if (turn !== begun) return;
   if (projector.surface !== surface) projector.setSurface(surface);
   points = sourcePoints(optics, settings.lampSize > 0);
-  total = Math.max(data.passes, points.length);
-  const [x, y] = halves();
-  projector.begin([x, y], 4 * x * y);
-  drawn = null;
+  total = points.length;
+  projector.begin(halves());
   ask();
 }
+// Waits until the browser has shown a frame.
+const shown = () => new Promise((resolve) => setTimeout(resolve, 50));
 
 function onePass() {
   const point = points[projector.passes % points.length];
@@ -99,16 +115,20 @@ function frame() {
   if (!asked) return;
   asked = false;
   const start = performance.now();
+  const before = projector.passes;
   for (let i = 0; i < each && projector.passes < total; ++i) onePass();
-  projector.show(gain() * 2 ** settings.exposure);
+  const ended = total > 0 ? projector.passes >= total : onlyStored();
+  if (ended && !onlyStored()) projector.keep(null);
+  if (projector.still || projector.passes > 0) projector.show(2 ** settings.exposure, gain());
   // As many passes as fit a fifteenth of a second.
   const spent = performance.now() - start;
-  each = Math.min(8, spent < 25 ? 2 * each : spent > 70 ? 1 : each);
-  const ended = projector.passes >= total;
+  if (projector.passes > before) each = Math.min(8, spent < 25 ? 2 * each : spent > 70 ? 1 : each);
   if (!lensView.firstPicture) lensView.firstPicture = performance.now();
-  find("progress").textContent = ended || swing ? "" : `${projector.passes} of ${total} passes`;
+  find("progress").textContent = ended || swing ? ""
+    : total > 1 ? `${projector.passes} of ${total} points of the lamp`
+      : projector.still ? "The program's picture, until the page's own is drawn" : "drawing";
   if (ended) finish();
-  else ask();
+  else if (total > 0) ask();
 }
 // Passes go on where no frame is shown, in a window behind others.
 function ask() {
@@ -120,7 +140,7 @@ function ask() {
 
 function finish() {
   if (!drawn && !swing) {
-    drawn = projector.picture().map((light) => light * gain());
+    drawn = projector.still ? programsPicture() : projector.picture().map((light) => light * gain());
     compare();
     const done = waiting;
     waiting = [];
@@ -138,8 +158,6 @@ function meanError(a, b) {
   for (let i = 0; i < a.length; ++i) sum += Math.abs(encoded(a[i]) - encoded(b[i]));
   return sum / a.length;
 }
-const asDesigned = () => Object.keys(kDefaults).every((name) =>
-  kOnlyShown.has(name) || name === "surface" || settings[name] === kDefaults[name]);
 
 function compare() {
   const errors = new Float32Array(target.length);
@@ -150,8 +168,11 @@ function compare() {
   find("top").textContent = String(top);
   find("difference-note").textContent = `between light and target, display values 0 … 1; mean ${fixed(mean, 4)}`;
   let said = `MAE ${fixed(mean, 4)} from the target`;
-  if (asDesigned()) {
-    lensView.error = meanError(drawn, pictureOf(stepsTo(settings.surface).pop().picture));
+  lensView.error = asDesigned() ? meanError(drawn, programsPicture()) : null;
+  if (onlyStored()) {
+    said += `. This is the program's picture ${shownOf().words}; what the page draws once a control is ` +
+            `moved differs from it by MAE ${fixed(shownOf().error, 4)}`;
+  } else if (asDesigned()) {
     said += `, ${fixed(lensView.error, 4)} from the program's picture ${shownOf().words}`;
   }
   find("said").textContent = said;
@@ -214,11 +235,19 @@ function causesAt(pixel) {
     causes.push([step.cause, now - before]);
     before = now;
   }
+  if (onlyStored()) return causes;
   causes.push([asDesigned() ? "the drawing in this page" : "your settings", drawn[pixel] - before]);
   return causes;
 }
 
 function probe() {
+  if (!projector.surface || projector.surface.id !== settings.surface) {
+    chosenSurface().then((surface) => {
+      projector.setSurface(surface);
+      if (drawn) probe();
+    });
+    return;
+  }
   const column = Math.min(kColumns - 1, Math.floor(marked[0] * kColumns));
   const row = Math.min(kRows - 1, Math.floor(marked[1] * kRows));
   const pixel = row * kColumns + column, [w, h] = halves();

@@ -1,13 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Draws the light of a surface on the screen: pass after pass, each in the light of one point of the
-// source and moved by a part of a sample, added up in floating point.
+// source, added up in floating point.
 
 // What the browser must be able to do; null, or what it lacks.
 function missingFeature(gl) {
   if (!gl) return "This browser has no WebGL 2";
   if (!gl.getExtension("EXT_color_buffer_float")) return "This browser cannot draw into floating-point textures";
+  if (typeof DecompressionStream === "undefined") return "This browser cannot unpack the lens's surface";
   return null;
 }
+
+const kPrograms = {
+  nodes: [kFullScreen, kNodes],
+  landing: [kFullScreen, kLanding],
+  triangle: [kFullScreen, kTriangle],
+  drawing: [kDraw, kAdd],
+  averaging: [kFullScreen, kPixels],
+  showing: [kFullScreen, kShow],
+};
 
 class Projector {
   // pixels: of the picture, columns and rows. front: coefficients of a front that is a height map, or
@@ -15,21 +25,16 @@ class Projector {
   constructor(canvas, gl, pixels, front) {
     this.canvas = canvas;
     this.gl = gl;
+    this.programs = new Map();
     this.pixels = pixels;
     // Without float blending half floats add the light, with 11 bits.
     this.exact = gl.getExtension("EXT_float_blend") !== null;
-    const program = (vertex, fragment) => this.program(vertex, fragment);
-    this.landing = program(kFullScreen, kLanding);
-    this.triangle = program(kFullScreen, kTriangle);
-    this.drawing = program(kDraw, kAdd);
-    this.averaging = program(kFullScreen, kPixels);
-    this.showing = program(kFullScreen, kShow);
     gl.bindVertexArray(gl.createVertexArray());
-    const longest = Math.max(...pixels);
-    this.each = Math.max(2, Math.round(1024 / longest));
-    const samples = this.exact ? gl.R32F : gl.R16F;
-    this.samples = this.target(samples, pixels[0] * this.each, pixels[1] * this.each);
+    // The picture is drawn in parts no larger than the largest point.
+    this.largest = Math.max(64, gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE)[1]);
+    this.sums = this.target(this.exact ? gl.R32F : gl.R16F, pixels[0], pixels[1]);
     this.mean = this.target(gl.RGBA32F, pixels[0], pixels[1]);
+    this.still = null;
     this.passes = 0;
     this.heights = this.heightMap(front);
   }
@@ -43,7 +48,12 @@ class Projector {
     return made;
   }
 
-  program(vertex, fragment) {
+  // A program, built when it is first used, so that the first picture need not wait for the others.
+  program(name) {
+    if (!this.programs.has(name)) this.programs.set(name, this.built(...kPrograms[name]));
+    return this.programs.get(name);
+  }
+  built(vertex, fragment) {
     const gl = this.gl, made = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
       const shader = gl.createShader(kind);
@@ -91,40 +101,69 @@ class Projector {
     return this.target(format, kSide, Math.max(1, Math.ceil(count / kSide)));
   }
 
+  free(lists) {
+    for (const old of Object.values(lists)) {
+      this.gl.deleteTexture(old.made);
+      if (old.frame) this.gl.deleteFramebuffer(old.frame);
+    }
+  }
+
   setSurface(surface) {
     const gl = this.gl;
-    for (const old of Object.values(this.lists || {})) {
-      gl.deleteTexture(old.made);
-      if (old.frame) gl.deleteFramebuffer(old.frame);
-    }
+    this.free(this.lists || {});
     this.surface = surface;
-    this.landings = surface.slopes ? surface.vertices : 3 * surface.triangles;
+    this.landings = surface.facets ? 3 * surface.triangles : surface.vertices;
+    const [places, slopes] = surface.spline ? this.nodesOf(surface) : [
+      this.list(surface.places, 4, [gl.RGBA32F, gl.RGBA, gl.FLOAT]),
+      this.list(surface.slopes || new Float32Array(2), 2, [gl.RG32F, gl.RG, gl.FLOAT])];
     this.lists = {
-      places: this.list(surface.places, 4, [gl.RGBA32F, gl.RGBA, gl.FLOAT]),
-      slopes: this.list(surface.slopes || new Float32Array(2), 2, [gl.RG32F, gl.RG, gl.FLOAT]),
+      places, slopes,
       corners: this.list(surface.corners || new Uint32Array(1), 1,
                          [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT]),
       landings: this.emptyList(gl.RGBA32F, this.landings),
-      densities: this.emptyList(gl.RGBA32F, surface.triangles),
+      fluxes: this.emptyList(gl.RG32F, surface.triangles),
     };
   }
 
+  // Places and slopes of a spline's nodes.
+  nodesOf(surface) {
+    const gl = this.gl, { spline, columns, rows, vertices } = surface;
+    const list = (values, width, format) => this.list(values, width, format);
+    const numbers = (values) => list(values, 1, [gl.R32F, gl.RED, gl.FLOAT]);
+    const table = (cells) => list(basisTable(cells, spline.samples), 4, [gl.RGBA32F, gl.RGBA, gl.FLOAT]);
+    const none = new Float32Array(1);
+    const given = { net_x: numbers(spline.bent ? spline.x : none), net_y: numbers(spline.bent ? spline.y : none),
+                    net_z: numbers(spline.z), along: table(spline.columns - 3), across: table(spline.rows - 3) };
+    const places = this.emptyList(gl.RGBA32F, vertices), slopes = this.emptyList(gl.RG32F, vertices);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, places.frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, gl.TEXTURE_2D, slopes.made, 0);
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+    this.use("nodes", { net: [spline.columns, spline.rows], grid: [columns, rows], samples: spline.samples,
+                           count: vertices, cell: spline.cell, level: spline.level, bent: spline.bent }, given);
+    this.fill(places);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, places.frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, gl.TEXTURE_2D, null, 0);
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0]);
+    this.free(given);
+    return [places, slopes];
+  }
+
   // Puts a program to work: its uniforms, and the textures that it reads by name.
-  use(program, numbers, textures) {
-    const gl = this.gl;
+  use(name, numbers, textures) {
+    const gl = this.gl, program = this.program(name);
     gl.useProgram(program.made);
-    Object.entries(textures).forEach(([name, texture], unit) => {
+    Object.entries(textures).forEach(([sampler, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture.made);
-      gl.uniform1i(program.place(name), unit);
+      gl.uniform1i(program.place(sampler), unit);
     });
-    for (const [name, value] of Object.entries(numbers)) {
-      const place = program.place(name);
+    for (const [uniform, value] of Object.entries(numbers)) {
+      const place = program.place(uniform);
       if (!place) continue;
-      if (Number.isInteger(value) && kWhole.has(name)) gl.uniform1i(place, value);
+      if (Number.isInteger(value) && kWhole.has(uniform)) gl.uniform1i(place, value);
       else if (typeof value === "boolean") gl.uniform1i(place, value ? 1 : 0);
       else if (typeof value === "number") gl.uniform1f(place, value);
-      else if (name === "grid") gl.uniform2i(place, ...value);
+      else if (kWhole.has(uniform)) gl[`uniform${value.length}i`](place, ...value);
       else gl[`uniform${value.length}f`](place, ...value);
     }
   }
@@ -137,31 +176,31 @@ class Projector {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  // Begins a picture. halves: of the screen that is shown, mm. area: of the picture, mm2.
-  begin(halves, area) {
+  // Begins a picture. halves: of the screen that is shown, mm.
+  begin(halves) {
     const gl = this.gl;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.samples.frame);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.sums.frame);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    Object.assign(this, { halves, area, passes: 0, weights: 0, whole: 0, share: 0 });
+    Object.assign(this, { halves, passes: 0, whole: 0, share: 0 });
   }
 
   surfaceNumbers() {
-    const { columns, rows, zigzag, corners, slopes } = this.surface;
-    return { grid: [columns, rows], layout_: corners ? 0 : zigzag ? 2 : 1, facets: !slopes };
+    const { columns, rows, zigzag, corners, facets } = this.surface;
+    return { grid: [columns, rows], layout_: corners ? 0 : zigzag ? 2 : 1, facets };
   }
 
-  // Where the light of every vertex lands, and how dense that of every triangle is.
+  // Where the light of every vertex lands, and how much every triangle has.
   trace(optics) {
-    const { places, slopes, corners, landings, densities } = this.lists;
+    const { places, slopes, corners, landings, fluxes } = this.lists;
     const numbers = { ...this.surfaceNumbers(), ...optics };
     const rows = (count) => Math.ceil(count / kSide);
-    this.use(this.landing, { ...numbers, count: this.landings },
+    this.use("landing", { ...numbers, count: this.landings },
              { places, slopes, corners, heights: this.heights });
     this.fill(landings, rows(this.landings));
-    this.use(this.triangle, { ...numbers, count: this.surface.triangles },
+    this.use("triangle", { ...numbers, count: this.surface.triangles },
              { places, slopes, corners, landings, heights: this.heights });
-    this.fill(densities, rows(this.surface.triangles));
+    this.fill(fluxes, rows(this.surface.triangles));
   }
 
   read(target, width, height) {
@@ -173,7 +212,7 @@ class Projector {
   // Light that the whole surface takes, mm2.
   takenLight() {
     const count = this.surface.triangles;
-    const values = this.read(this.lists.densities, kSide, Math.ceil(count / kSide));
+    const values = this.read(this.lists.fluxes, kSide, Math.ceil(count / kSide));
     let sum = 0;
     for (let t = 0; t < count; ++t) sum += values[4 * t + 1];
     return sum;
@@ -182,32 +221,50 @@ class Projector {
   // Adds the light of one point of the source. whole: light that the surface takes, mm2, where that
   // is known.
   pass(optics, share, whole) {
-    const gl = this.gl, { places, slopes, corners, landings, densities } = this.lists;
+    const gl = this.gl, { corners, landings, fluxes } = this.lists;
     this.trace(optics);
     this.whole = this.whole || whole || this.takenLight();
-    const i = this.passes++;
-    const shift = [(i * 0.7548776662466927 + 0.5) % 1 - 0.5, (i * 0.5698402909980532 + 0.5) % 1 - 0.5];
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.samples.frame);
-    gl.viewport(0, 0, this.samples.width, this.samples.height);
+    const [columns, rows] = this.pixels, { surface } = this;
+    const pairs = !surface.corners && !surface.facets;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.sums.frame);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE);
-    this.use(this.drawing, {
-      ...this.surfaceNumbers(), halves: this.halves, weight: share * this.area / this.whole,
-      shift: [2 * shift[0] * this.halves[0] / this.samples.width,
-              2 * shift[1] * this.halves[1] / this.samples.height],
-    }, { places, slopes, corners, landings, densities });
-    gl.drawArrays(gl.TRIANGLES, 0, 3 * this.surface.triangles);
+    const numbers = { ...this.surfaceNumbers(), halves: this.halves, pixels: this.pixels, pairs,
+                      weight: share * columns * rows / this.whole };
+    for (let row = 0; row < rows; row += this.largest) {
+      for (let column = 0; column < columns; column += this.largest) {
+        const part = [column, row, Math.min(this.largest, columns - column), Math.min(this.largest, rows - row)];
+        gl.viewport(...part);
+        this.use("drawing", { ...numbers, part }, { corners, landings, fluxes });
+        gl.drawArrays(gl.POINTS, 0, pairs ? surface.triangles / 2 : surface.triangles);
+      }
+    }
     this.share += share;
+    ++this.passes;
   }
 
   average() {
-    this.use(this.averaging, { each: this.each, gain: 1 / this.share }, { samples: this.samples });
+    this.use("averaging", { gain: 1 / this.share }, { sums: this.sums });
     this.fill(this.mean);
   }
-  show(exposure) {
-    const { canvas } = this;
-    this.average();
-    this.use(this.showing, { exposure, size: [canvas.width, canvas.height] }, { picture: this.mean });
+  // Shows a given picture, linear light with row 0 on top, instead of the one that is drawn; null
+  // ends that.
+  keep(picture) {
+    const gl = this.gl, [columns, rows] = this.pixels;
+    if (this.still) gl.deleteTexture(this.still.made);
+    this.still = null;
+    if (!picture) return;
+    const flipped = new Float32Array(columns * rows);
+    for (let r = 0; r < rows; ++r) flipped.set(picture.subarray(r * columns, (r + 1) * columns), (rows - 1 - r) * columns);
+    this.still = this.texture(gl.R32F, columns, rows);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, columns, rows, gl.RED, gl.FLOAT, flipped);
+  }
+  // exposure: of the picture kept; gain: light of an even picture.
+  show(exposure, gain) {
+    const { canvas, still } = this;
+    if (!still) this.average();
+    this.use("showing", { exposure: still ? exposure : exposure * gain, size: [canvas.width, canvas.height] },
+             { picture: still || this.mean });
     this.fill(null);
   }
   // Linear light, 1 for an evenly lit picture; row 0 on top.
@@ -227,23 +284,24 @@ class Projector {
   // triangles whose light covers it. at: mm from the screen's centre.
   sourcesOf(at, half) {
     const lands = this.read(this.lists.landings, kSide, Math.ceil(this.landings / kSide));
-    const dense = this.read(this.lists.densities, kSide, Math.ceil(this.surface.triangles / kSide));
-    const { places, slopes, triangles } = this.surface, found = [];
+    const flux = this.read(this.lists.fluxes, kSide, Math.ceil(this.surface.triangles / kSide));
+    const { facets, triangles, vertices } = this.surface, found = [];
+    const places = this.surface.places || this.read(this.lists.places, kSide, Math.ceil(vertices / kSide));
     for (let t = 0; t < triangles; ++t) {
-      if (!(dense[4 * t] > 0)) continue;
-      const v = cornersOf(this.surface, t), l = slopes ? v : [3 * t, 3 * t + 1, 3 * t + 2];
+      if (!(flux[4 * t] > 0)) continue;
+      const v = cornersOf(this.surface, t), l = facets ? [3 * t, 3 * t + 1, 3 * t + 2] : v;
       const p = [0, 1, 2].map((k) => [lands[4 * l[k]] - at[0], lands[4 * l[k] + 1] - at[1]]);
-      const covered = coveredArea(p, half);
+      const covered = coveredArea(p, half), area = coveredArea(p, Infinity);
       if (!(covered > 0)) continue;
       const middle = (k) => (places[4 * v[0] + k] + places[4 * v[1] + k] + places[4 * v[2] + k]) / 3;
-      found.push({ x: middle(0), y: middle(1), light: covered * dense[4 * t] });
+      found.push({ x: middle(0), y: middle(1), light: covered / area * flux[4 * t] });
     }
     return found;
   }
 }
 
 // Uniforms that are whole numbers.
-const kWhole = new Set(["layout_", "steps", "count", "each"]);
+const kWhole = new Set(["layout_", "steps", "count", "samples", "grid", "net", "part"]);
 
 // Area of a triangle inside the square of half-side `half` about the origin (Sutherland and Hodgman).
 function coveredArea(triangle, half) {

@@ -4,6 +4,9 @@
 
 const kSide = 2048;  // Numbers in a row of the textures that hold lists.
 
+// Pixels: triangles that are thinner are drawn so wide.
+const kWide = 0.01;
+
 const kHead = `#version 300 es
 precision highp float;
 precision highp int;
@@ -125,6 +128,51 @@ const kFullScreen = kHead + `
 void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }
 `;
 
+// Places and slopes of a spline's nodes from its control points.
+const kNodes = kHead + `
+uniform sampler2D net_x, net_y, net_z;  // Offsets from an even grid.
+uniform sampler2D along, across;        // Basis functions of every node: values, slopes.
+uniform ivec2 net;                      // Control points along x and y.
+uniform ivec2 grid;                     // Nodes.
+uniform int samples;                    // Nodes per knot cell.
+uniform int count;
+uniform vec2 cell;                      // Of the knots, mm.
+uniform float level;                    // Of the heights.
+uniform bool bent;                      // False if the offsets along x and y are 0.
+layout(location = 0) out vec4 place;
+layout(location = 1) out vec4 slope;
+
+vec4 row(sampler2D numbers, int first) {
+  return vec4(texelFetch(numbers, at(first), 0).x, texelFetch(numbers, at(first + 1), 0).x,
+              texelFetch(numbers, at(first + 2), 0).x, texelFetch(numbers, at(first + 3), 0).x);
+}
+
+// Sum and derivatives by the parameters.
+vec3 sum(sampler2D numbers, ivec2 first, vec4 u, vec4 du, vec4 v, vec4 dv) {
+  vec3 s = vec3(0.0);
+  for (int k = 0; k < 4; ++k) {
+    vec4 c = row(numbers, (first.y + k) * net.x + first.x);
+    s += vec3(v[k] * dot(u, c), v[k] * dot(du, c), dv[k] * dot(u, c));
+  }
+  return s;
+}
+
+void main() {
+  int i = int(gl_FragCoord.y) * ${kSide} + int(gl_FragCoord.x);
+  place = slope = vec4(0.0);
+  if (i >= count) return;
+  ivec2 node = ivec2(i % grid.x, i / grid.x), first = min(node / samples, net - 4);
+  vec4 u = texelFetch(along, at(2 * node.x), 0), du = texelFetch(along, at(2 * node.x + 1), 0),
+       v = texelFetch(across, at(2 * node.y), 0), dv = texelFetch(across, at(2 * node.y + 1), 0);
+  vec3 x = vec3(0.0), y = vec3(0.0), z = sum(net_z, first, u, du, v, dv);
+  if (bent) { x = sum(net_x, first, u, du, v, dv); y = sum(net_y, first, u, du, v, dv); }
+  x.y += cell.x;
+  y.z += cell.y;
+  place = vec4(cell * vec2(node) / float(samples) + vec2(x.x, y.x), level + z.x, 0.0);
+  slope = vec4(vec2(z.y * y.z - z.z * y.y, z.z * x.y - z.y * x.z) / (x.y * y.z - y.y * x.z), 0.0, 0.0);
+}
+`;
+
 // Where the light of every vertex lands, or of every facet's corners.
 const kLanding = kHead + kSurface + kLight + `
 uniform int count;
@@ -142,7 +190,7 @@ void main() {
 }
 `;
 
-// Density and flux of every triangle: the light that it takes over the area that it lights.
+// The light of every triangle: what goes to the screen, and what it takes.
 const kTriangle = kHead + kSurface + kLight + `
 uniform sampler2D landings;
 uniform int count;
@@ -186,47 +234,117 @@ void main() {
   if (loses) flux *= passage(p, q, r);
   vec3 a = texelFetch(landings, at(l[0]), 0).xyz, b = texelFetch(landings, at(l[1]), 0).xyz,
        c = texelFetch(landings, at(l[2]), 0).xyz;
-  float area = 0.5 * abs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
   bool lit = a.z * b.z * c.z > 0.0 && flux > 0.0;
-  result = vec4(lit && area > 0.0 ? flux / area : 0.0, flux, 0.0, 0.0);
+  result = vec4(lit ? flux : 0.0, flux, 0.0, 0.0);
 }
 `;
 
-// The image triangles, their densities added up.
+// The light of the image triangles in every pixel: a point covers the pixels of a cell's two
+// triangles, or of one triangle. a, b, c and a, c, d are the corners, in pixels.
 const kDraw = kHead + kSurface + `
 uniform sampler2D landings;
-uniform sampler2D densities;
+uniform sampler2D fluxes;
+uniform ivec4 part;   // Of the picture that is drawn: first pixel and count, each way.
+uniform vec2 pixels;  // Of the picture.
 uniform vec2 halves;  // Of the screen that is shown, mm.
-uniform vec2 shift;   // By which this pass is moved, in the same.
 uniform float weight;
-flat out float density;
+uniform bool pairs;
+flat out vec4 ab, cd;
+flat out vec2 light;
+flat out float inside;  // 1 if all of it is in one pixel.
+
+float flux(int t) { return weight * texelFetch(fluxes, at(t), 0).x; }
+vec2 landing(int i) { return (0.5 + 0.5 * texelFetch(landings, at(i), 0).xy / halves) * pixels; }
+
 void main() {
-  int t = gl_VertexID / 3, k = gl_VertexID % 3;
-  density = weight * texelFetch(densities, at(t), 0).x;
-  vec2 l = texelFetch(landings, at(facets ? gl_VertexID : corners_of(t)[k]), 0).xy;
-  gl_Position = density > 0.0 ? vec4((l + shift) / halves, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+  int n = gl_VertexID;
+  ivec4 corner;
+  if (pairs) {
+    ivec3 s = corners_of(2 * n), t = corners_of(2 * n + 1);
+    bool other = layout_ == 2 && s.z == t.z;
+    corner = other ? ivec4(t, s.x) : ivec4(s, t.z);
+    light = other ? vec2(flux(2 * n + 1), flux(2 * n)) : vec2(flux(2 * n), flux(2 * n + 1));
+  } else {
+    corner = facets ? ivec4(3 * n, 3 * n + 1, 3 * n + 2, 3 * n) : corners_of(n).xyzx;
+    light = vec2(flux(n), 0.0);
+  }
+  vec2 a = landing(corner.x), c = landing(corner.z);
+  vec2 b = light.x > 0.0 ? landing(corner.y) : a, d = light.y > 0.0 ? landing(corner.w) : a;
+  ab = vec4(a, b);
+  cd = vec4(c, d);
+  vec2 first = vec2(part.xy), size = vec2(part.zw);
+  vec2 least = min(min(a, b), min(c, d)), most = max(max(a, b), max(c, d));
+  inside = floor(least) == floor(most) ? 1.0 : 0.0;
+  float wide = inside > 0.0 ? 0.0 : ${kWide};
+  vec2 low = clamp(floor(least - wide) - first, vec2(0.0), size);
+  vec2 high = clamp(floor(most + wide) + 1.0 - first, vec2(0.0), size);
+  float side = max(high.x - low.x, high.y - low.y);
+  bool seen = light.x + light.y > 0.0 && high.x > low.x && high.y > low.y;
+  // A point whose centre is outside is not drawn.
+  vec2 half_ = 0.5 * min(vec2(side), size);
+  vec2 middle = clamp(low + 0.5 * side, half_, size - half_);
+  gl_Position = seen ? vec4(2.0 * middle / size - 1.0, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+  gl_PointSize = max(side, 1.0);
 }
 `;
 const kAdd = kHead + `
-flat in float density;
-out vec4 light;
-void main() { light = vec4(density, 0.0, 0.0, 0.0); }
+flat in vec4 ab, cd;
+flat in vec2 light;
+flat in float inside;
+out vec4 sum;
+
+float cross_(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
+
+// Area between an edge and the lower side of the pixel [0, 1]², inside the pixel, signed by the
+// edge's way along x (Green's theorem, as design/flux/).
+float below(vec2 a, vec2 b) {
+  float from = clamp(a.x, 0.0, 1.0), to = clamp(b.x, 0.0, 1.0);
+  if (from == to) return 0.0;
+  float rise = (b.y - a.y) / (b.x - a.x);
+  float y = a.y + rise * (from - a.x), z = a.y + rise * (to - a.x);
+  float low = min(y, z), high = max(y, z), floor_ = clamp(low, 0.0, 1.0), roof = clamp(high, 0.0, 1.0);
+  float mean = high - low > 1e-6
+    ? (0.5 * (roof - floor_) * (roof + floor_) + max(0.0, high - max(low, 1.0))) / (high - low)
+    : floor_;
+  return (to - from) * mean;
+}
+
+// Share of a triangle in the pixel. One that is as good as a line is widened, since rounding would
+// make its share anything.
+float share(vec2 a, vec2 b, vec2 c) {
+  float twice = cross_(b - a, c - a);
+  if (abs(twice) < ${kWide * kWide}) {
+    vec2 p = b - a, q = c - b, r = a - c;
+    if (dot(q, q) > dot(p, p) && dot(q, q) >= dot(r, r)) { vec2 s = a; a = b; b = c; c = s; }
+    else if (dot(r, r) > dot(p, p)) { vec2 s = b; b = a; a = c; c = s; }
+    float length_ = distance(a, b), side = twice < 0.0 ? -1.0 : 1.0;
+    vec2 way = length_ > 1e-6 ? (b - a) / length_ : vec2(1.0, 0.0);
+    if (length_ < ${kWide}) b = a + ${kWide} * way;
+    c += side * ${kWide} * vec2(-way.y, way.x);
+    twice = cross_(b - a, c - a);
+  }
+  return abs(below(a, b) + below(b, c) + below(c, a)) / (0.5 * abs(twice));
+}
+
+void main() {
+  if (inside > 0.0) {
+    sum = vec4(light.x + light.y, 0.0, 0.0, 0.0);
+    return;
+  }
+  vec2 pixel = floor(gl_FragCoord.xy), a = ab.xy - pixel, c = cd.xy - pixel;
+  float light_ = 0.0;
+  if (light.x > 0.0) light_ += light.x * share(a, ab.zw - pixel, c);
+  if (light.y > 0.0) light_ += light.y * share(a, c, cd.zw - pixel);
+  sum = vec4(light_, 0.0, 0.0, 0.0);
+}
 `;
 
-// The mean over the samples of every pixel of the picture; row 0 at the bottom.
+// The picture from the sum over the source's points; row 0 at the bottom.
 const kPixels = kHead + `
-uniform sampler2D samples;
-uniform int each;  // Samples a pixel, each way.
+uniform sampler2D sums;
 uniform float gain;
 out vec4 mean;
-void main() {
-  ivec2 first = each * ivec2(gl_FragCoord.xy);
-  float sum = 0.0;
-  for (int y = 0; y < each; ++y) {
-    for (int x = 0; x < each; ++x) sum += texelFetch(samples, first + ivec2(x, y), 0).x;
-  }
-  mean = vec4(gain * sum / float(each * each), 0.0, 0.0, 1.0);
-}
+void main() { mean = vec4(gain * texelFetch(sums, ivec2(gl_FragCoord.xy), 0).x, 0.0, 0.0, 1.0); }
 `;
 
 // What the eye sees: display-encoded, with the colour of the light.

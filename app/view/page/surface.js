@@ -32,35 +32,109 @@ function pictureOf(stored) {
   return picture;
 }
 
-// Places x y z and slopes of every vertex, four and two numbers each, and the triangles' corners.
-function decodeSurface(stored, lensSize) {
-  const places = new Float32Array(4 * stored.vertices);
-  const slopes = stored.facets ? null : new Float32Array(2 * stored.vertices);
-  const { columns, rows } = stored;
-  for (const channel of stored.channels) {
-    if (channel.name === "x") {
-      const cell = columns > 1 ? lensSize[0] / (columns - 1) : 0;
-      eachNumber(channel, stored.vertices, (i, x) => { places[4 * i] = x + cell * (columns > 1 ? i % columns : 0); });
-    } else if (channel.name === "y") {
-      const cell = rows > 1 ? lensSize[1] / (rows - 1) : 0;
-      eachNumber(channel, stored.vertices, (i, y) => {
-        places[4 * i + 1] = y + cell * (rows > 1 ? Math.floor(i / columns) : 0);
-      });
-    } else if (channel.name === "z") {
-      eachNumber(channel, stored.vertices, (i, z) => { places[4 * i + 2] = z; });
-    } else {
-      const axis = channel.name === "slope_x" ? 0 : 1;
-      eachNumber(channel, stored.vertices, (i, slope) => { slopes[2 * i + axis] = slope; });
-    }
+async function inflated(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+// Undoes differences of second order along a line of `count` numbers, `stride` apart.
+function addUp(numbers, first, count, stride) {
+  for (let i = 1, at = first + stride; i < count; ++i, at += stride) {
+    numbers[at] += 2 * numbers[at - stride] - (i > 1 ? numbers[at - 2 * stride] : 0);
   }
-  const given = stored.corners && bytesOf(document.getElementById(stored.corners).textContent);
+}
+
+// The whole numbers of a channel: steps above its lowest value.
+async function stepsOf(channel) {
+  const { columns, rows } = channel, count = columns * rows;
+  const numbers = new Int32Array(count);
+  if (channel.step === 0) return numbers;
+  const bytes = await inflated(bytesOf(document.getElementById(channel.element).textContent));
+  for (let i = 0; i < count; ++i) {
+    const folded = bytes[i] | bytes[i + count] << 8 | bytes[i + 2 * count] << 16 | bytes[i + 3 * count] << 24;
+    numbers[i] = folded >>> 1 ^ -(folded & 1);
+  }
+  for (let column = 0; column < columns; ++column) addUp(numbers, column, rows, columns);
+  for (let row = 0; row < rows; ++row) addUp(numbers, row * columns, columns, 1);
+  return numbers;
+}
+
+// The numbers of a channel, relative to `level`.
+async function channelOf(stored, name, level = 0) {
+  const channel = stored.channels.find((one) => one.name === name);
+  const low = channel.low - level, step = channel.step;
+  return Float32Array.from(await stepsOf(channel), (number) => low + step * number);
+}
+
+// Control points as offsets from an even grid; heights above their lowest, since floats near 0 are
+// finer.
+async function decodedSpline(stored, lensSize) {
+  const { columns, rows, low } = stored.channels.find((one) => one.name === "z");
+  const [x, y, z] = await Promise.all([channelOf(stored, "x"), channelOf(stored, "y"), channelOf(stored, "z", low)]);
+  const bent = stored.channels.some((one) => one.name !== "z" && one.step !== 0);
+  return { x, y, z, bent, columns, rows, level: low, samples: stored.samples,
+           cell: [lensSize[0] / (columns - 3), lensSize[1] / (rows - 3)] };
+}
+
+// Places x y z and slopes of every vertex, four and two numbers each.
+async function decodedMesh(stored, lensSize) {
+  const { columns, rows, vertices } = stored;
+  const [x, y, z] = await Promise.all(["x", "y", "z"].map((name) => channelOf(stored, name)));
+  const places = new Float32Array(4 * vertices);
+  const across = columns > 1 ? lensSize[0] / (columns - 1) : 0, up = rows > 1 ? lensSize[1] / (rows - 1) : 0;
+  for (let i = 0; i < vertices; ++i) {
+    places[4 * i] = x[i] + (columns > 1 ? across * (i % columns) : 0);
+    places[4 * i + 1] = y[i] + (columns > 1 ? up * Math.floor(i / columns) : 0);
+    places[4 * i + 2] = z[i];
+  }
+  if (stored.facets) return { places, slopes: null };
+  const slopes = new Float32Array(2 * vertices);
+  const [right, rising] = await Promise.all(["slope_x", "slope_y"].map((name) => channelOf(stored, name)));
+  for (let i = 0; i < vertices; ++i) {
+    slopes[2 * i] = right[i];
+    slopes[2 * i + 1] = rising[i];
+  }
+  return { places, slopes };
+}
+
+async function decodeSurface(stored, lensSize) {
+  const { columns, rows, vertices, triangles, zigzag, facets } = stored;
+  const corners = stored.channels.find((one) => one.name === "corners");
   return {
-    places, slopes, columns, rows,
-    vertices: stored.vertices,
-    triangles: stored.triangles,
-    zigzag: stored.zigzag,
-    corners: given ? new Uint32Array(given.buffer) : null,
+    id: stored.id, columns, rows, vertices, triangles, zigzag, facets,
+    corners: corners ? new Uint32Array(await stepsOf(corners)).map((v) => v + corners.low) : null,
+    spline: stored.spline ? await decodedSpline(stored, lensSize) : null,
+    ...(stored.spline ? {} : await decodedMesh(stored, lensSize)),
   };
+}
+
+// Values and slopes of the four cubic B-splines over [0, cells] that are not 0 at each of the nodes,
+// `samples` to a knot cell; the knots at the ends are fourfold (core/spline/cubic_spline.h).
+function basisTable(cells, samples) {
+  const table = new Float32Array(8 * (cells * samples + 1));
+  for (let i = 0; i <= cells * samples; ++i) {
+    const cell = Math.min(Math.floor(i / samples), cells - 1), t = i / samples;
+    const knot = (k) => Math.min(Math.max(cell + k, 0), cells);
+    let n = [1], lower = n;
+    for (let p = 1; p <= 3; ++p) {
+      lower = n;
+      n = new Array(p + 1).fill(0);
+      lower.forEach((value, r) => {
+        const left = knot(r + 1 - p), right = knot(r + 1), share = value / (right - left);
+        n[r] += (right - t) * share;
+        n[r + 1] += (t - left) * share;
+      });
+    }
+    const slope = [0, 0, 0, 0];
+    lower.forEach((value, r) => {
+      const share = 3 * value / (knot(r + 1) - knot(r - 2));
+      slope[r] -= share;
+      slope[r + 1] += share;
+    });
+    table.set(n, 8 * i);
+    table.set(slope, 8 * i + 4);
+  }
+  return table;
 }
 
 // The vertices of a triangle; as corners_of() in the shaders.

@@ -90,7 +90,7 @@
     `precision mediump float; varying vec2 lean; varying float level; uniform vec2 range;
      void main() {
        vec3 n = normalize(vec3(-lean, 1.0));
-       float light = 0.28 + 0.72 * max(0.0, dot(n, normalize(vec3(-0.6, 0.6, 0.75))));
+       float light = 0.1 + 0.9 * max(0.0, dot(n, normalize(vec3(-0.6, 0.6, 0.75))));
        float t = clamp((level - range.x) / max(1e-6, range.y - range.x), 0.0, 1.0);
        gl_FragColor = vec4(mix(vec3(0.55, 0.62, 0.72), vec3(0.98, 0.97, 0.93), t) * light, 1.0); }`);
   const lineProgram = program(

@@ -10,10 +10,13 @@
 
 #include "app/view/browser.h"
 #include "app/view/lens_view.h"
+#include "core/image/transfer.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
+#include "core/spline/control_net.h"
+#include "core/spline/cubic_spline.h"
 #include "core/temp_folder.h"
 #include "design/render.h"
 
@@ -142,6 +145,26 @@ Image picture_of(const nlohmann::json& values, const Image& like) {
   return image;
 }
 
+/// Largest amount, of display values, by which a pixel exceeds the program's picture more than all
+/// its neighbours do.
+double brightest_speck(const Image& drawn, const Image& own) {
+  const auto excess = [&](int column, int row) {
+    return encode(drawn.at(column, row)) - encode(own.at(column, row));
+  };
+  double most = 0.0;
+  for (int row = 1; row + 1 < own.rows(); ++row) {
+    for (int column = 1; column + 1 < own.columns(); ++column) {
+      double beside = -1.0;
+      for (int k = 0; k < 9; ++k) {
+        if (k == 4) continue;
+        beside = std::max<double>(beside, excess(column + k % 3 - 1, row + k / 3 - 1));
+      }
+      most = std::max(most, excess(column, row) - beside);
+    }
+  }
+  return most;
+}
+
 TEST_P(PageLight, IsTheProgramsPicture) {
   if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
   const Lens lens = bumpy_lens(std::get<0>(GetParam()), std::get<1>(GetParam()));
@@ -157,12 +180,90 @@ TEST_P(PageLight, IsTheProgramsPicture) {
   EXPECT_TRUE(run.requests.empty());
   ASSERT_TRUE(run.result.is_object());
   const double error = compare(picture_of(run.result["picture"], lens.render), lens.render).mae;
-  EXPECT_LT(error, 0.004);
+  const Image drawn = picture_of(run.result["picture"], lens.render);
+  EXPECT_LT(error, lens.setup.extent.width > 0.0 ? 0.004 : 0.001);
+  EXPECT_LT(brightest_speck(drawn, lens.render), 0.02);
   EXPECT_NEAR(run.result["said"].get<double>(), error, 1e-4);
   // Two pixels aside it would not be.
   Image moved = lens.render;
   std::rotate(moved.values().begin(), moved.values().begin() + 2, moved.values().end());
   EXPECT_GT(compare(moved, lens.render).mae, 2.0 * error);
+}
+
+/// A spline whose knots are not even, so steep that its light folds over.
+Lens folding_spline() {
+  Lens lens = bumpy_lens({"AlongZ", along_z}, SurfaceModel::kSmooth);
+  constexpr int kCells = 40;
+  ControlNet net{{kCells + 3, kCells + 3}, {}};
+  net.points.resize(3, (kCells + 3) * (kCells + 3));
+  for (int j = 0; j < net.shape.rows; ++j) {
+    for (int i = 0; i < net.shape.columns; ++i) {
+      const double u = greville_point(i, kCells) / kCells;
+      const double v = greville_point(j, kCells) / kCells;
+      net.points.col(j * net.shape.columns + i) << kSize.x() * (u + 0.02 * std::sin(6.283185 * u)),
+          kSize.y() * (v - 0.02 * std::sin(6.283185 * v)),
+          5.0 + 0.4 * std::sin(9.0 * u) * std::cos(8.0 * v);
+    }
+  }
+  lens.model = SurfaceModel::kSpline;
+  lens.spline = net;
+  const SampledSurface nodes = picture_nodes(net);
+  evaluate(nodes.mesh, nodes.normals, lens.setup, lens.target, &lens.render, Executor::cpu(2));
+  return lens;
+}
+
+TEST(PageSpline, ThatFoldsItsLightHasNoSpecks) {
+  if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
+  const Lens lens = folding_spline();
+  const testing::TempFolder folder;
+  const LensView view = view_of_lens(lens, "folds", Executor::cpu(2));
+  EXPECT_LT(view.surfaces.front().storage_error, 5e-4);
+  testing::write_bytes(folder / "view.html", view_page(view));
+  const PageRun run = testing::run_page(
+      folder / "view.html", "await lensView.finished(); return Array.from(lensView.picture());");
+  EXPECT_EQ(run.error, "");
+  ASSERT_TRUE(run.result.is_array());
+  const Image drawn = picture_of(run.result, lens.render);
+  EXPECT_LT(compare(drawn, lens.render).mae, 1e-3);
+  EXPECT_LT(brightest_speck(drawn, lens.render), 0.02);
+}
+
+TEST(PageFallback, OfAnInexactSurfaceIsTheProgramsUntilAControlMoves) {
+  if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
+  const Lens lens = bumpy_lens({"AlongZ", along_z}, SurfaceModel::kSmooth);
+  LensView view = view_of_lens(lens, "bumps", Executor::cpu(2));
+  view.surfaces.front().storage_error = 0.02;
+  const testing::TempFolder folder;
+  testing::write_bytes(folder / "view.html", view_page(view));
+  const PageRun run =
+      testing::run_page(folder / "view.html",
+                        "await lensView.finished(); const error = lensView.error, "
+                        "said = document.querySelector('[data-said]').textContent; "
+                        "lensView.set('turn', 8); await lensView.finished(); "
+                        "return { error, said, moved: Array.from(lensView.picture()) };");
+  EXPECT_EQ(run.error, "");
+  ASSERT_TRUE(run.result.is_object());
+  EXPECT_LT(run.result["error"].get<double>(), 1e-4);
+  EXPECT_NE(run.result["said"].get<std::string>().find("This is the program's picture"),
+            std::string::npos);
+  EXPECT_GT(compare(picture_of(run.result["moved"], lens.render), lens.render).mae, 0.02);
+}
+
+TEST(PageScript, RefusesWhatDoesNotExistInOneSentence) {
+  if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
+  const Lens lens = bumpy_lens({"AlongZ", along_z}, SurfaceModel::kSmooth);
+  const testing::TempFolder folder;
+  testing::write_bytes(folder / "view.html",
+                       view_page(view_of_lens(lens, "bumps", Executor::cpu(2))));
+  const PageRun run = testing::run_page(
+      folder / "view.html",
+      "return [['foo', 1], ['toString', 1], ['surface', 'milled'], ['turn', '5']].map((one) => { "
+      "try { lensView.set(...one); return 'taken'; } catch (e) { return e.message; } });");
+  ASSERT_TRUE(run.result.is_array()) << run.error;
+  EXPECT_EQ(run.result[0].get<std::string>().find("This page has no setting \"foo\"; it has "), 0U);
+  EXPECT_EQ(run.result[1].get<std::string>().find("This page has no setting \"toString\""), 0U);
+  EXPECT_EQ(run.result[2], "This page has no surface \"milled\"; it has designed.");
+  EXPECT_EQ(run.result[3], "The setting turn must be a number, not \"5\".");
 }
 
 }  // namespace
