@@ -2,7 +2,6 @@
 #include "cam/job/cut_report.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,6 +10,7 @@
 #include <variant>
 
 #include "cam/plan/finishing.h"
+#include "cam/plan/sheets.h"
 #include "cam/post/program_part.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/front.h"
@@ -212,9 +212,6 @@ std::string length_words_of(const PostDescription& post, const ProgramFiles& pro
   return length_words(post, most, "the tool of each program");
 }
 
-/// Thicknesses in which sheets of acrylic are sold, mm.
-constexpr std::array kSheets{2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0};
-
 /// Decimals of a blank's height: nobody measures it finer.
 constexpr int kHeightDecimals = 2;
 
@@ -229,20 +226,13 @@ bool takes_sheet(const WrittenCut& cut) {
          !setup.lens->setup.front;
 }
 
-/// The thinnest sheet that is as high as the blank; 0 if none is.
-double sheet_for(double height) {
-  const auto* const found = std::find_if(kSheets.begin(), kSheets.end(),
-                                         [height](double sheet) { return sheet >= height; });
-  return found == kSheets.end() ? 0.0 : *found;
-}
-
 /// How a sheet becomes as high as the blank.
 std::string height_words(const CutSetup& setup, double sheet) {
   const double height = setup.blank.max().z();
   const std::string needed = mm(height, kHeightDecimals);
   if (sheet == 0.0) {
     return joined({"at least ", needed, ", more than sheets on sale have (",
-                   trimmed_decimal(kSheets.back(), 0), " mm): face a block to ", needed});
+                   trimmed_decimal(kSheetsOnSale.back(), 0), " mm): face a block to ", needed});
   }
   const std::string bought = trimmed_decimal(sheet, 0) + " mm";
   const std::string fit = joined({"a sheet of ", bought, ", the next on sale above ", needed});
@@ -286,7 +276,7 @@ SetupSheet setup_sheet(const WrittenCut& cut) {
   sheet.length_words = length_words_of(options.post, cut.programs);
   sheet.z_words = z_zero_words(setup);
   if (takes_sheet(cut)) {
-    sheet.sheet = sheet_for(setup.blank.max().z());
+    sheet.sheet = thinnest_sheet(kSheetsOnSale, setup.blank.max().z());
     sheet.height_words = height_words(setup, sheet.sheet);
   }
   sheet.apron = setup.apron;

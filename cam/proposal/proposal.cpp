@@ -226,10 +226,8 @@ ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const 
   const double mean = scaled * (heights.mean() - heights.minCoeff());
   const Eigen::Vector2d size = size_of(design, {picture.columns(), picture.rows()});
   result.operations = operation_times(wish.cut, size, result.relief, mean);
-  const double needed = design.thickness + result.relief;
-  for (const double sheet : wish.sheets) {
-    if (sheet >= needed && (result.sheet == 0.0 || sheet < result.sheet)) result.sheet = sheet;
-  }
+  result.sheet = thinnest_sheet(
+      wish.sheets, design.thickness + result.relief + wish.cut.workshop.stock.allowance);
   const Eigen::Vector2i all = pixels_of({picture.columns(), picture.rows()}, design.pixels);
   result.design_seconds = estimate_design(all.x(), all.y(), design, executor.concurrency()).seconds;
   result.sharp_pixels = sharp_pixels(wish, {picture.columns(), picture.rows()});

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cam/plan/cam_options.h"
+#include "cam/plan/sheets.h"
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"
@@ -21,7 +22,7 @@ struct ProposalWish {
   bool pixelled = false;  ///< design.pixels is stated.
   CamOptions cut;         ///< Workshop and part.
   double hours = 8.0;     ///< On the machine at most, > 0.
-  std::vector<double> sheets = {2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30};  ///< Thicknesses, mm.
+  std::vector<double> sheets{kSheetsOnSale.begin(), kSheetsOnSale.end()};  ///< Thicknesses, mm.
 };
 
 /// Duration of one operation of a cut.

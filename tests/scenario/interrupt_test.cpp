@@ -26,6 +26,7 @@ class Interrupt : public Scenario {
   /// Every command with work for a second or more, but for info.
   [[nodiscard]] std::vector<Arguments> commands() const {
     return {small_design(picture("rings.png"), path("new")),
+            {"plan", picture("portrait.png"), "--lamp", "laser"},
             {"render", path("lens"), "--pixels", "2000", "--out", path("new.png")},
             {"cam", path("lens"), "--light-model", "rays", "--pitch", "0.05mm"},
             {"nest", path("lens"), "--light-model", "rays", "--out", path("sheet"), "--blank",

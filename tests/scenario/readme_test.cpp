@@ -34,6 +34,7 @@ std::vector<Arguments> readme_commands() {
 Arguments small_options(const std::string& command) {
   const Arguments coarse = {"--pitch", "1mm", "--tool-diameter", "2mm", "--no-semi", "--no-render"};
   const std::map<std::string, Arguments> options = {
+      {"plan", {"--pixels", "16", "--width", "10mm", "--focal", "50mm"}},
       {"design",
        {"--pixels", "24", "--width", "12mm", "--focal", "60mm", "--quality", "draft", "--rounds",
         "1"}},
@@ -91,7 +92,7 @@ TEST_F(Readme, ItsCommandsWorkInTheirOrder) {
     names.insert(command.front());
   }
   EXPECT_EQ(names, (std::set<std::string>{"batch", "cam", "coupon", "design", "export", "info",
-                                          "nest", "reflect", "render", "send", "view"}));
+                                          "nest", "plan", "reflect", "render", "send", "view"}));
 }
 
 TEST_F(Readme, NotesNameTheNextCommandAndFilesThatExist) {

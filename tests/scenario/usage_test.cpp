@@ -20,6 +20,7 @@ class Usage : public Scenario {
 
 TEST_F(Usage, HelpOfEveryCommandIsPrintedOnStdout) {
   for (const Arguments& arguments : std::vector<Arguments>{{"--help"},
+                                                           {"plan", "--help"},
                                                            {"design", "--help"},
                                                            {"render", "-h"},
                                                            {"cam", "--help"},

@@ -235,6 +235,8 @@ FieldValue other_value(const Field& field) {
     return FieldValue(field.words.front()) == value ? field.words.back() : field.words.front();
   }
   if (field.name == "--front") return "sphere:3000";
+  if (field.name == "--lamp") return "sun";
+  if (field.name == "--material") return "pc";
   if (field.name == "--wavelengths") return "450,650";
   if (field.kind == FieldKind::kText) return field.unit == "X,Y,Z" ? "1,2,-3" : "1,2";
   const double now = number_of(value);
@@ -251,6 +253,7 @@ TEST(DesignFingerprint, ChangesWithEveryOption) {
   all.add(description_of(changed.light));
   all.add(description_of(changed.weights));
   for (const Field& field : all) {
+    if (field.name == "--source-picture") continue;  // The shape that it shows is stored.
     const DesignOptions before = changed;
     field.set(other_value(field));
     EXPECT_TRUE(seen.insert(design_fingerprint(picture, changed)).second) << field.name;
@@ -285,8 +288,8 @@ TEST(DesignFingerprint, ChangesWithEveryNumberOfTheProcess) {
 
 TEST(DesignFingerprint, EveryMemberOfTheOptionsHasARow) {
   // Weights and light have tables of their own, the process comes from a workshop, the outline may
-  // come from a file; checkpoint and resume do not change the result.
-  constexpr std::size_t kWithoutRow = 6;
+  // come from a file; checkpoint and resume do not change the result. The light's lamp has a row.
+  constexpr std::size_t kWithoutRow = 5;
   EXPECT_EQ(description_of(DesignOptions()).size() + kWithoutRow,
             testing::member_count<DesignOptions>());
   EXPECT_EQ(description_of(ObjectiveWeights()).size(), testing::member_count<ObjectiveWeights>());

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/proposal/proposal.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "design/setup/lamps.h"
+
+namespace lensforge {
+namespace {
+
+/// A bright disc with soft edges on grey.
+Image disc(int side) {
+  Image image(side, side);
+  for (int row = 0; row < side; ++row) {
+    for (int column = 0; column < side; ++column) {
+      const double x = (column + 0.5) / side - 0.5;
+      const double y = (row + 0.5) / side - 0.5;
+      image.at(column, row) = x * x + y * y < 0.09 ? 0.9F : 0.2F;
+    }
+  }
+  return image;
+}
+
+ProposalWish wish_for(const std::string& lamp) {
+  ProposalWish wish;
+  set_lamp(wish.design.light, lamp);
+  return wish;
+}
+
+double minutes_of(const std::vector<OperationMinutes>& operations, const std::string& name) {
+  for (const OperationMinutes& one : operations) {
+    if (one.name == name) return one.minutes;
+  }
+  return 0.0;
+}
+
+TEST(Proposal, ASourceOfTwiceTheWidthShowsHalfAsManyPixels) {
+  const int narrow = sharp_pixels(wish_for("led:3mm@600mm"), {256, 256});
+  const int wide = sharp_pixels(wish_for("led:6mm@600mm"), {256, 256});
+  EXPECT_NEAR(narrow, 2 * wide, 2);
+  // The lamp's image: 3 mm × 300 mm / 600 mm, 1.5 mm of 100.
+  EXPECT_NEAR(narrow, 66, 3);
+}
+
+TEST(Proposal, DiffractionLimitsALaser) {
+  // √(λ f) = √(532e-6 × 300) mm = 0.4 mm of 100.
+  EXPECT_NEAR(sharp_pixels(wish_for("laser"), {256, 256}), 250, 5);
+}
+
+TEST(Proposal, TimesAreThoseOfALongCut) {
+  // A 256² portrait on 100 mm, as cam times its programs: 39.9, 77.8 and 343.9 minutes.
+  const std::vector<OperationMinutes> times =
+      operation_times(CamOptions(), {100.0, 100.0}, 11.2, 5.6);
+  EXPECT_NEAR(minutes_of(times, "rough"), 39.9, 0.25 * 39.9);
+  EXPECT_NEAR(minutes_of(times, "semi"), 77.8, 0.03 * 77.8);
+  EXPECT_NEAR(minutes_of(times, "finish"), 343.9, 0.02 * 343.9);
+}
+
+TEST(Proposal, HoursLimitTheWidth) {
+  ProposalWish wish = wish_for("laser");
+  wish.hours = 0.5;
+  wish.design.pixels = 16;
+  wish.pixelled = true;
+  const std::vector<Proposal> proposals = propose(disc(32), wish, Executor::cpu(), {});
+  ASSERT_FALSE(proposals.empty());
+  const Proposal& first = proposals.front();
+  EXPECT_LT(first.design.width, 30.0);
+  EXPECT_GT(first.design.width, 10.0);
+  EXPECT_LE(first.forecast.minutes(), 33.0);
+  EXPECT_EQ(first.design.pixels, 16);
+  EXPECT_GT(first.forecast.sharp_pixels, 16);
+  EXPECT_GT(first.forecast.mae, 0.0);
+  EXPECT_DOUBLE_EQ(first.forecast.contrast, 0.0);  // The picture has no dark pixel.
+  EXPECT_GE(first.forecast.sheet, first.design.thickness + first.forecast.relief);
+  for (const Proposal& other : proposals) EXPECT_GT(other.forecast.sheet, 0.0);
+}
+
+TEST(Proposal, ContradictionsAreRefused) {
+  ProposalWish wish = wish_for("led:3mm@600mm");
+  wish.design.light.source_position = Eigen::Vector3d(0.0, 0.0, -100.0);
+  EXPECT_THROW((void)propose(disc(32), wish, Executor::cpu(), {}), InputError);
+}
+
+}  // namespace
+}  // namespace lensforge
