@@ -163,7 +163,8 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
     settings.design.model = SurfaceModel::kSpline;
     if (settings.made_by != "default") {
       settings.cut.workshop = read_workshop(settings.made_by);
-      (void)post_of(settings.cut.workshop, settings.made_by);  // A wrong one is named before the design.
+      (void)post_of(settings.cut.workshop,
+                    settings.made_by);  // A wrong one is named before the design.
     }
   }
   settings.design = default_design_options(settings.design.model, picture);

@@ -20,10 +20,10 @@ namespace lensforge::app {
 struct DesignSettings {
   std::string target;
   std::string out;
-  std::string outline;         ///< Edge of the lens; empty: its rectangle.
-  Background background;       ///< Behind target, source's shape and outline.
-  std::string made_by;         ///< Workshop file, or "default"; empty: not designed for a process.
-  bool robust = false;         ///< Design for parts polished less or more than made_by states.
+  std::string outline;    ///< Edge of the lens; empty: its rectangle.
+  Background background;  ///< Behind target, source's shape and outline.
+  std::string made_by;    ///< Workshop file, or "default"; empty: not designed for a process.
+  bool robust = false;    ///< Design for parts polished less or more than made_by states.
   CamOptions cut;  ///< For made_by: whether the part or a mould is milled, and the shrinkage.
   DesignOptions design;
   std::vector<std::string> changes;  ///< Changes made to the pictures above, in words.

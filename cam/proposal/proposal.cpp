@@ -2,7 +2,6 @@
 #include "cam/proposal/proposal.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
@@ -139,24 +138,22 @@ DesignOptions trial_of(const DesignOptions& design, int pixels) {
 Image blurred(const Image& picture, bool along_rows) {
   constexpr int kReach = 2;  // 5 standard deviations.
   constexpr double kSigma = 1.0 / kGaussianWidth;
-  std::array<double, 2 * kReach + 1> weights{};
-  for (int k = -kReach; k <= kReach; ++k) {
-    weights[static_cast<std::size_t>(k + kReach)] = std::exp(-0.5 * k * k / (kSigma * kSigma));
-  }
-  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
   const auto inside = [](int k, int count) {
     return std::clamp(k < 0 ? -1 - k : k >= count ? 2 * count - 1 - k : k, 0, count - 1);
   };
   Image result(picture.columns(), picture.rows());
   for (int row = 0; row < picture.rows(); ++row) {
     for (int column = 0; column < picture.columns(); ++column) {
-      double value = 0.0;
+      double sum = 0.0;
+      double weights = 0.0;
       for (int k = -kReach; k <= kReach; ++k) {
         const int x = along_rows ? inside(column + k, picture.columns()) : column;
         const int y = along_rows ? row : inside(row + k, picture.rows());
-        value += weights[static_cast<std::size_t>(k + kReach)] * picture.at(x, y);
+        const double weight = std::exp(-0.5 * k * k / (kSigma * kSigma));
+        weights += weight;
+        sum += weight * picture.at(x, y);
       }
-      result.at(column, row) = static_cast<float>(value / sum);
+      result.at(column, row) = static_cast<float>(sum / weights);
     }
   }
   return result;
@@ -234,37 +231,55 @@ ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const 
   return result;
 }
 
-/// A wish that shows more pixels, and how; none if nothing changes them.
-std::optional<std::pair<ProposalWish, std::string>> sharper(const ProposalWish& asked,
-                                                            const Eigen::Vector2i& picture) {
-  ProposalWish other = asked;
-  other.pixelled = false;
-  other.sized = true;
-  const double nearest =
-      1.5 * std::max(size_of(asked.design, picture).maxCoeff(), asked.design.light.image_width);
-  if (0.5 * asked.design.focal_length >= nearest) {
-    other.design.focal_length *= 0.5;
-    return std::pair{completed(std::move(other), picture),
-                     "a wall at " + number_text(0.5 * asked.design.focal_length) +
-                         " mm instead of " + number_text(asked.design.focal_length)};
+/// Sizes to try.
+struct Variant {
+  std::string title;
+  std::string words;
+  ProposalWish wish;
+};
+
+/// More pixels: a wall at half the distance or, where it is as near as the lens is wide, a picture
+/// of twice the width.
+Variant sharper(const ProposalWish& asked, const Eigen::Vector2i& picture) {
+  constexpr double kNearest = 1.5;  // In widths of the lens or the picture.
+  Variant variant{"sharper", "", asked};
+  ProposalWish& wish = variant.wish;
+  wish.pixelled = false;
+  wish.sized = true;
+  DesignOptions& design = wish.design;
+  const double wide = design.light.image_width > 0.0 ? design.light.image_width : design.width;
+  const double far = design.focal_length;
+  if (0.5 * far >= kNearest * std::max(size_of(design, picture).maxCoeff(), wide)) {
+    design.focal_length *= 0.5;
+    variant.words =
+        joined({"a wall at ", number_text(0.5 * far), " mm instead of ", number_text(far)});
+  } else {
+    design.light.image_width = 2.0 * wide;
+    variant.words =
+        joined({"a picture ", number_text(2.0 * wide), " mm wide instead of ", number_text(wide)});
   }
-  const double wide =
-      asked.design.light.image_width > 0.0 ? asked.design.light.image_width : asked.design.width;
-  other.design.light.image_width = 2.0 * wide;
-  return std::pair{
-      completed(std::move(other), picture),
-      "a picture " + number_text(2.0 * wide) + " mm wide instead of " + number_text(wide)};
+  wish = completed(std::move(wish), picture);
+  return variant;
 }
 
-/// A wish that takes a quarter of the time.
-ProposalWish quicker(const ProposalWish& asked, const Eigen::Vector2i& picture) {
-  ProposalWish other = asked;
-  other.sized = true;
-  other.pixelled = false;
-  other.design.width *= 0.5;
-  other.design.focal_length *= 0.5;
-  other.design.light.image_width *= 0.5;
-  return completed(std::move(other), picture);
+/// A quarter of the time.
+Variant quicker(const ProposalWish& asked, const Eigen::Vector2i& picture) {
+  Variant variant{"quicker", "everything half as large", asked};
+  ProposalWish& wish = variant.wish;
+  wish.sized = true;
+  wish.pixelled = false;
+  wish.design.width *= 0.5;
+  wish.design.focal_length *= 0.5;
+  wish.design.light.image_width *= 0.5;
+  wish = completed(std::move(wish), picture);
+  return variant;
+}
+
+Proposal proposal_of(const Image& picture, const Variant& variant, const Executor& executor,
+                     const RunControl& control) {
+  validate(variant.wish.design, picture);
+  return {variant.title, variant.words, variant.wish.design,
+          forecast(picture, variant.wish, executor, control)};
 }
 
 }  // namespace
@@ -318,24 +333,24 @@ std::vector<OperationMinutes> operation_times(const CamOptions& options,
 std::vector<Proposal> propose(const Image& picture, const ProposalWish& wish,
                               const Executor& executor, const RunControl& control) {
   const Eigen::Vector2i size(picture.columns(), picture.rows());
-  const ProposalWish asked = completed(wish, size);
-  std::vector<std::pair<ProposalWish, std::array<std::string, 2>>> wishes;
-  wishes.push_back({asked, {"as asked", ""}});
-  if (auto other = sharper(asked, size)) {
-    wishes.push_back({std::move(other->first), {"sharper", std::move(other->second)}});
+  DesignOptions stated = wish.design;
+  if (!wish.pixelled) stated.pixels = std::min(stated.pixels, size.maxCoeff());
+  validate(stated, picture);
+  const Variant asked{"as asked", "", completed(wish, size)};
+  std::vector<Proposal> proposals{proposal_of(picture, asked, executor, control)};
+  std::vector<Variant> others{sharper(asked.wish, size)};
+  const DesignOptions& design = asked.wish.design;
+  if (proposals.front().forecast.minutes() > kMinutesPerHour && 0.5 * design.width >= kMinWidth) {
+    others.push_back(quicker(asked.wish, size));
   }
-  const double relief = kUsualRelief * asked.design.width;
-  const double minutes =
-      total(operation_times(asked.cut, size_of(asked.design, size), relief, 0.5 * relief));
-  if (minutes > kMinutesPerHour && 0.5 * asked.design.width >= kMinWidth) {
-    wishes.push_back({quicker(asked, size), {"quicker", "everything half as large"}});
-  }
-  std::vector<Proposal> proposals;
-  for (auto& [one, words] : wishes) {
-    validate(one.design, picture);
-    ProposalForecast expected = forecast(picture, one, executor, control);
-    if (!proposals.empty() && expected.sheet == 0.0) continue;  // Nobody can make it.
-    proposals.push_back({words[0], words[1], one.design, std::move(expected)});
+  for (const Variant& other : others) {
+    try {
+      Proposal proposal = proposal_of(picture, other, executor, control);
+      // Without a sheet nobody makes it.
+      if (proposal.forecast.sheet > 0.0) proposals.push_back(std::move(proposal));
+    } catch (const InputError&) {
+      // No surface does it in this light: it is no proposal.
+    }
   }
   return proposals;
 }
