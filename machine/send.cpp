@@ -19,7 +19,6 @@
 #include "core/schema/description.h"
 #include "core/text/words.h"
 #include "machine/gcode/gcode_dialect.h"
-#include "machine/gcode/program_dialect.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/guard/spindle_guard.h"
 #include "machine/link/link.h"

@@ -170,12 +170,8 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
   settings.design = default_design_options(settings.design.model, picture);
   options.restate();
   LightOptions& light = settings.design.light;
-  if (!light.source_picture.empty()) {
-    const LoadedImage shape =
-        read_image(light.source_picture, control, kDrawnSide, settings.background);
-    note_changes(settings, "--source-picture " + light.source_picture, shape.changes);
-    light.source_shape = shape_of(shape.image);
-  }
+  note_changes(settings, "--source-picture " + light.source_picture,
+               read_lamp(light, settings.background, control));
   if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
   if (!settings.outline.empty()) {
     OutlineChoice choice = outline_from(settings.outline, settings.background, control);
@@ -505,9 +501,7 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
                             {"metrics", metrics_json(lens)},
                             {"iterations", result.convergence.size()},
                             {"seconds", lens.provenance.json()["seconds"]}};
-  for (const PictureBlur& blur : blurs_of(lens)) {
-    summary["blur"].push_back({{"cause", blur.cause}, {"pixels", blur.pixels}});
-  }
+  summary["blur"] = blurs_json(blurs_of(lens));
   if (result.source) summary["source_check"] = source_json(*result.source);
   if (result.colors) summary["fringe_mm"] = fringe_json(result.colors->fringe);
   if (result.made) summary["made"] = metrics_json(result.made->metrics);

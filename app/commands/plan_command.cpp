@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/optics/picture_blur.h"
+#include "core/page/html_page.h"
 #include "core/schema/option_text.h"
 #include "core/text/number_text.h"
 #include "core/text/read_numbers.h"
@@ -74,22 +74,18 @@ std::vector<double> sheets_of(const std::string& text) {
   return sheets;
 }
 
-std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
-
-/// The options of a proposal that differ from a design's defaults, as typed.
+/// The options of a proposal that differ from those of its lamp and material, as typed.
 std::string options_of(const Proposal& proposal) {
-  const Description usual = known(*std::make_unique<DesignOptions>());
+  const std::set<std::string> always{"--width", "--focal", "--pixels"};
   DesignOptions design = proposal.design;
+  DesignOptions usual;
+  set_lamp(usual.light, design.light.lamp);
+  usual.light.lamp.clear();  // It is to be named.
+  set_material(design.material, usual.light, usual.ior, usual.light.spectrum.abbe);
+  const Description without = known(usual);
   std::string text;
-  const bool lamp = !design.light.lamp.empty();
   for (const Field& field : known(design)) {
-    // A lamp and a material stand for these.
-    const bool stood_for = (lamp && (field.name.starts_with("--source") ||
-                                     field.name == "--emission" || field.name == "--wavelength")) ||
-                           (!design.material.empty() && field.name == "--ior");
-    const bool size =
-        field.name == "--width" || field.name == "--focal" || field.name == "--pixels";
-    if (stood_for || (!size && field.get() == usual.at(field.name).get())) continue;
+    if (!always.contains(field.name) && field.get() == without.at(field.name).get()) continue;
     text += " " + field.name + " " + shell_word(value_text(field.get()));
   }
   return text;
@@ -107,14 +103,6 @@ Commands commands_of(const Proposal& proposal, const PlanSettings& settings) {
               (own ? " --workshop " + shell_word(settings.made_by) : "")};
 }
 
-nlohmann::json json_of_blurs(const std::vector<PictureBlur>& blurs) {
-  nlohmann::json all = nlohmann::json::array();
-  for (const PictureBlur& blur : blurs) {
-    all.push_back({{"cause", blur.cause}, {"pixels", blur.pixels}});
-  }
-  return all;
-}
-
 nlohmann::json json_of(const Proposal& proposal, const PlanSettings& settings) {
   const ProposalForecast& f = proposal.forecast;
   nlohmann::json operations = nlohmann::json::array();
@@ -123,63 +111,54 @@ nlohmann::json json_of(const Proposal& proposal, const PlanSettings& settings) {
   }
   const Commands commands = commands_of(proposal, settings);
   const DesignOptions& design = proposal.design;
-  return {
-      {"title", proposal.title},
-      {"words", proposal.words},
-      {"width_mm", design.width},
-      {"focal_mm", design.focal_length},
-      {"image_width_mm", design.light.image_width > 0.0 ? design.light.image_width : design.width},
-      {"pixels", design.pixels},
-      {"sharp_pixels", f.sharp_pixels},
-      {"blur", json_of_blurs(f.blurs)},
-      {"light_model", f.waves ? "waves" : "rays"},
-      {"mae", f.mae},
-      {"leakage", f.leakage},
-      {"contrast", f.contrast},
-      {"relief_mm", f.relief},
-      {"sheet_mm", f.sheet > 0.0 ? nlohmann::json(f.sheet) : nlohmann::json()},
-      {"operations", operations},
-      {"minutes", f.minutes()},
-      {"design_seconds", f.design_seconds},
-      {"commands", {commands.design, commands.cam}}};
-}
-
-std::string hours_text(double minutes) {
-  constexpr double kMinutesPerHour = 60.0;
-  constexpr double kSecondsPerMinute = 60.0;
-  if (minutes < 2.0) return fixed(kSecondsPerMinute * minutes, 0) + " s";
-  if (minutes < 1.5 * kMinutesPerHour) return fixed(minutes, 0) + " min";
-  return fixed(minutes / kMinutesPerHour, 1) + " h";
+  return {{"title", proposal.title},
+          {"words", proposal.words},
+          {"width_mm", design.width},
+          {"focal_mm", design.focal_length},
+          {"image_width_mm", picture_width(design)},
+          {"pixels", design.pixels},
+          {"sharp_pixels", f.sharp_pixels},
+          {"blur", blurs_json(f.blurs)},
+          {"light_model", f.waves ? "waves" : "rays"},
+          {"mae", f.mae},
+          {"leakage", f.leakage},
+          {"contrast", f.contrast},
+          {"relief_mm", f.relief},
+          {"sheet_mm", f.sheet > 0.0 ? nlohmann::json(f.sheet) : nlohmann::json()},
+          {"operations", operations},
+          {"minutes", f.minutes()},
+          {"design_seconds", f.design_seconds},
+          {"commands", {commands.design, commands.cam}}};
 }
 
 std::string text_of(const Proposal& proposal, const PlanSettings& settings) {
   const ProposalForecast& f = proposal.forecast;
   const DesignOptions& design = proposal.design;
-  const double image = design.light.image_width > 0.0 ? design.light.image_width : design.width;
   std::string text = capitalised(proposal.title);
   if (!proposal.words.empty()) text += ": " + proposal.words;
   text += "\n  lens      " + number_text(design.width) + " mm wide, wall at " +
-          number_text(design.focal_length) + " mm, picture " + number_text(image) +
+          number_text(design.focal_length) + " mm, picture " + number_text(picture_width(design)) +
           " mm wide with " + std::to_string(design.pixels) + " pixels";
   if (design.pixels > f.sharp_pixels) {
     text += "; only " + std::to_string(f.sharp_pixels) + " would be sharp in this light";
   }
   text += "\n  light     " + blur_words(f.blurs) + "; the picture goes by " +
           (f.waves ? "waves" : "rays");
-  text += "\n  expect    MAE about " + fixed(f.mae, 4) + ", " + percent(f.leakage) +
+  text += "\n  expect    MAE about " + fixed(f.mae, 4) + ", " + percent_text(f.leakage) +
           " of the light leaks";
-  if (f.contrast > 0.0) text += ", contrast " + fixed(f.contrast, 0) + " : 1";
+  if (f.contrast > 0.0) text += ", contrast " + contrast_text(f.contrast);
   text += "\n  blank     relief " + fixed(f.relief, 1) + " mm on " + number_text(design.thickness) +
           " mm: ";
   text += f.sheet > 0.0
               ? "a sheet of " + number_text(f.sheet) + " mm"
               : std::string("thicker than every sheet on sale; a farther wall needs less");
-  text += "\n  machine   " + hours_text(f.minutes());
+  text += "\n  machine   " + duration_text(f.minutes());
   std::string parts;
   for (const OperationMinutes& one : f.operations) {
-    parts = with_word(std::move(parts), one.name + " " + hours_text(one.minutes));
+    parts = with_word(std::move(parts), one.name + " " + duration_text(one.minutes));
   }
-  text += " (" + parts + "); the design takes about " + hours_text(f.design_seconds / 60.0) + "\n";
+  text +=
+      " (" + parts + "); the design takes about " + duration_text(f.design_seconds / 60.0) + "\n";
   const Commands commands = commands_of(proposal, settings);
   return text + "    " + commands.design + "\n    " + commands.cam + "\n";
 }
@@ -197,10 +176,9 @@ CommandResult run(CommandFrame& frame, PlanSettings& settings) {
   for (const std::string& change : picture.changes) {
     frame.console().note(joined({settings.target, ": ", change}));
   }
-  LightOptions& light = wish.design.light;
-  if (!light.source_picture.empty()) {
-    light.source_shape = shape_of(
-        read_image(light.source_picture, frame.control(), kDrawnSide, settings.background).image);
+  for (const std::string& change :
+       read_lamp(wish.design.light, settings.background, frame.control())) {
+    frame.console().note(joined({wish.design.light.source_picture, ": ", change}));
   }
   const std::vector<Proposal> proposals =
       propose(picture.image, wish, frame.executor(), frame.control());

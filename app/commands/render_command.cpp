@@ -26,7 +26,6 @@
 #include "core/text/number_text.h"
 #include "design/design.h"
 #include "design/render.h"
-#include "design/setup/lamps.h"
 #include "design/setup/option_tables.h"
 #include "design/waves/wave_picture.h"
 #include "export/solid/solid_reading.h"
@@ -148,9 +147,8 @@ void require_waves(const Scene& scene, const OptionSet& options, const RenderArg
 void put_lamp(const RenderArguments& arguments, CommandFrame& frame, RenderOptions& render) {
   LightOptions& light = render.light;
   if (light.lamp.empty()) return;
-  if (!light.source_picture.empty()) {
-    light.source_shape = shape_of(
-        read_image(light.source_picture, frame.control(), kDrawnSide, arguments.background).image);
+  for (const std::string& change : read_lamp(light, arguments.background, frame.control())) {
+    frame.console().note("--lamp " + light.source_picture + ": " + change);
   }
   put_lamp(light, render.setup);
 }

@@ -26,7 +26,7 @@
 #include "core/error.h"
 #include "core/io/lens_folder.h"
 #include "core/text/words.h"
-#include "machine/gcode/program_dialect.h"
+#include "machine/gcode/gcode_dialect.h"
 #include "machine/link/port.h"
 #include "machine/send.h"
 

@@ -53,6 +53,14 @@ nlohmann::json files_json(const std::vector<std::filesystem::path>& files) {
   return list;
 }
 
+nlohmann::json blurs_json(const std::vector<PictureBlur>& blurs) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const PictureBlur& blur : blurs) {
+    list.push_back({{"cause", blur.cause}, {"pixels", blur.pixels}});
+  }
+  return list;
+}
+
 std::string quoted(const std::string& text, std::string_view escaped) {
   std::string all = "'";
   for (const char c : text) {

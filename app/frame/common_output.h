@@ -34,6 +34,9 @@ std::string fringe_text(const Fringe& fringe);
 /// The paths of files, in order.
 nlohmann::json files_json(const std::vector<std::filesystem::path>& files);
 
+/// Blurs as [{"cause", "pixels"}].
+nlohmann::json blurs_json(const std::vector<PictureBlur>& blurs);
+
 /// The text in single quotes, valid in bash, zsh and fish. @param escaped  characters that get a
 /// backslash.
 std::string quoted(const std::string& text, std::string_view escaped = {});

@@ -10,7 +10,6 @@
 #include <variant>
 
 #include "cam/plan/finishing.h"
-#include "cam/plan/sheets.h"
 #include "cam/post/program_part.h"
 #include "core/io/lens_folder.h"
 #include "core/optics/front.h"

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"
-#include "machine/gcode/program_dialect.h"
+#include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/program_seal.h"
 #include "machine/planner/planner_model.h"
 

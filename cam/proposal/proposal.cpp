@@ -44,6 +44,8 @@ constexpr double kUsualRelief = 0.1;
 
 constexpr double kUsualWidth = 100.0;  ///< mm
 constexpr double kMinWidth = 10.0;     ///< mm
+/// Room for tools beside the blank, mm.
+constexpr double kBeside = 10.0;
 
 double rough_length(const CamOptions& options, const Eigen::Vector2d& size, double relief,
                     double mean) {
@@ -84,7 +86,7 @@ constexpr double kMinutesPerHour = 60.0;
 /// The widest lens, in whole mm, that the hours and the machine's travel allow.
 double width_within(const ProposalWish& wish, const Eigen::Vector2i& picture) {
   const Eigen::Vector3d& travel = wish.cut.workshop.machine.travel;
-  const double beside = 2.0 * (wish.cut.workshop.stock.margin + kMinWidth);
+  const double beside = 2.0 * (wish.cut.workshop.stock.margin + kBeside);
   const auto fits = [&](double width) {
     const Eigen::Vector2d size(width, width * picture.y() / picture.x());
     const double relief = kUsualRelief * width;
@@ -92,10 +94,9 @@ double width_within(const ProposalWish& wish, const Eigen::Vector2i& picture) {
            total(operation_times(wish.cut, size, relief, 0.5 * relief)) <=
                kMinutesPerHour * wish.hours;
   };
-  double width = wish.design.light.image_width > 0.0
-                     ? std::min(kUsualWidth, wish.design.light.image_width)
-                     : kUsualWidth;
-  width = std::max(kMinWidth, std::floor(width));
+  const double image = wish.design.light.image_width;
+  double width = std::floor(image > 0.0 ? std::min(kUsualWidth, image) : kUsualWidth);
+  width = std::max(kMinWidth, width);
   while (width > kMinWidth && !fits(width)) width -= 1.0;
   return width;
 }
@@ -117,14 +118,21 @@ ProposalWish completed(ProposalWish wish, const Eigen::Vector2i& picture) {
   return wish;
 }
 
-/// The design of a part of the wall: `share` of its pixels at their size.
-DesignOptions trial_of(const DesignOptions& design, int pixels) {
-  const double share = static_cast<double>(pixels) / design.pixels;
-  DesignOptions trial = design;
+/// The design with lens and picture `share` times as large, before the same lamp.
+DesignOptions resized(DesignOptions design, double share, const Eigen::Vector2i& picture) {
+  const Eigen::Vector2d before = size_of(design, picture);
+  design.width *= share;
+  design.light.image_width *= share;
+  if (design.light.source_position) {
+    design.light.source_position->head<2>() -= 0.5 * (before - size_of(design, picture));
+  }
+  return design;
+}
+
+/// The design of a part of the wall: fewer pixels of the same size.
+DesignOptions trial_of(const DesignOptions& design, int pixels, const Eigen::Vector2i& picture) {
+  DesignOptions trial = resized(design, static_cast<double>(pixels) / design.pixels, picture);
   trial.pixels = pixels;
-  trial.width *= share;
-  trial.light.image_width *= share;
-  trial.light.image_offset *= share;
   trial.checkpoint.clear();
   // Half of the time, and an MAE that is 0.0007 (portrait) to 0.0027 (logo) higher by rays.
   trial.rounds = std::min(trial.rounds, 3);
@@ -181,53 +189,72 @@ FluxPicture flux_of(const Image& image, double whole) {
   return picture;
 }
 
-/// Forecast by a small design and the model of its process.
-ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const Executor& executor,
-                          const RunControl& control) {
-  const DesignOptions& design = wish.design;
-  const int pixels = std::min(kTrialPixels, design.pixels);
-  const DesignOptions small = trial_of(design, pixels);
-  require_light(design, pixels_of({picture.columns(), picture.rows()}, design.pixels));
-  const DesignResult trial = design_lens(picture, small, executor, control);
-  if (trial.status == DesignResult::Status::kInterrupted) throw Interrupted();
-  const Lens& lens = trial.lens;
+/// A small design and the picture of the part that the wish's process makes of it.
+struct Trial {
+  Lens lens;
+  PictureQuality quality;
+};
+
+/// @throw Interrupted
+Trial tried(const Image& picture, const ProposalWish& wish, const DesignOptions& small, bool waves,
+            const Executor& executor, const RunControl& control) {
+  DesignResult result = design_lens(picture, small, executor, control);
+  if (result.status == DesignResult::Status::kInterrupted) throw Interrupted();
+  const Lens& lens = result.lens;
   const MadeBy process = made_by(wish.cut, false);
-  ProposalForecast result;
-  result.blurs = blurs_of(
-      wish, optical_setup(design, pixels_of({picture.columns(), picture.rows()}, design.pixels)));
-  result.waves = waves_show(result.blurs);
   Image designed = lens.render;
   Image part;
-  if (result.waves) {
-    const WaveOptions waves = wave_options(small, lens.setup);
-    designed = wall_of(lens, std::nullopt, waves, executor, control).picture;
-    part = wall_of(lens, process, waves, executor, control).picture;
+  if (waves) {
+    const WaveOptions options = wave_options(small, lens.setup);
+    designed = wall_of(lens, std::nullopt, options, executor, control).picture;
+    part = wall_of(lens, process, options, executor, control).picture;
   } else {
     part = made_part(lens, process, executor).picture;
   }
   const double whole = lens.target.total();
   const FluxPicture reference = flux_of(designed, whole);
-  const PictureQuality quality =
-      PictureJudge(lens.target, reference, wish.cut.leakage).judge(flux_of(part, whole));
-  const double grown = static_cast<double>(design.pixels) / pixels;
-  const double detail = detail_at(picture, pixels);
-  const double share = detail > 0.0 ? detail_at(picture, design.pixels) / detail : 1.0;
-  const double scale = std::pow(grown, kRimPower) * std::pow(share, kDetailPower);
-  result.mae = kPasses * scale * quality.metrics.mae + limit_of(picture, design, executor);
-  result.leakage = scale * quality.leakage;
-  const double contrast = quality.contrast();
+  const PictureJudge judge(lens.target, reference, wish.cut.leakage);
+  const PictureQuality quality = judge.judge(flux_of(part, whole));
+  return {std::move(result.lens), quality};
+}
+
+/// Factor from a trial's errors to those of the design's pixels.
+double error_scale(const Image& picture, int pixels, int trial_pixels) {
+  const double detail = detail_at(picture, trial_pixels);
+  const double share = detail > 0.0 ? detail_at(picture, pixels) / detail : 1.0;
+  return std::pow(static_cast<double>(pixels) / trial_pixels, kRimPower) *
+         std::pow(share, kDetailPower);
+}
+
+/// Forecast by a small design and the model of its process.
+ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const Executor& executor,
+                          const RunControl& control) {
+  const DesignOptions& design = wish.design;
+  const Eigen::Vector2i size(picture.columns(), picture.rows());
+  const Eigen::Vector2i all = pixels_of(size, design.pixels);
+  ProposalForecast result;
+  result.blurs = blurs_of(wish, optical_setup(design, all));
+  result.sharp_pixels = sharp_pixels(wish, size);
+  result.waves = waves_show(result.blurs);
+  result.design_seconds = estimate_design(all.x(), all.y(), design, executor.concurrency()).seconds;
+
+  const int pixels = std::min(kTrialPixels, design.pixels);
+  const Trial trial =
+      tried(picture, wish, trial_of(design, pixels, size), result.waves, executor, control);
+  const double scale = error_scale(picture, design.pixels, pixels);
+  result.mae = kPasses * scale * trial.quality.metrics.mae + limit_of(picture, design, executor);
+  result.leakage = scale * trial.quality.leakage;
+  const double contrast = trial.quality.contrast();
   result.contrast = std::isfinite(contrast) ? contrast : 0.0;
-  const Eigen::VectorXd heights = lens.surface.vertices.row(2);
-  const double scaled = grown * grown;
-  result.relief = scaled * (heights.maxCoeff() - heights.minCoeff());
-  const double mean = scaled * (heights.mean() - heights.minCoeff());
-  const Eigen::Vector2d size = size_of(design, {picture.columns(), picture.rows()});
-  result.operations = operation_times(wish.cut, size, result.relief, mean);
+
+  // Slopes and widths of the trial are smaller by the same factor.
+  const double higher = std::pow(static_cast<double>(design.pixels) / pixels, 2);
+  const Eigen::VectorXd heights = trial.lens.surface.vertices.row(2);
+  result.relief = higher * (heights.maxCoeff() - heights.minCoeff());
+  const double mean = higher * (heights.mean() - heights.minCoeff());
+  result.operations = operation_times(wish.cut, size_of(design, size), result.relief, mean);
   result.sheet = thinnest_sheet(
       wish.sheets, design.thickness + result.relief + wish.cut.workshop.stock.allowance);
-  const Eigen::Vector2i all = pixels_of({picture.columns(), picture.rows()}, design.pixels);
-  result.design_seconds = estimate_design(all.x(), all.y(), design, executor.concurrency()).seconds;
-  result.sharp_pixels = sharp_pixels(wish, {picture.columns(), picture.rows()});
   return result;
 }
 
@@ -247,7 +274,7 @@ Variant sharper(const ProposalWish& asked, const Eigen::Vector2i& picture) {
   wish.pixelled = false;
   wish.sized = true;
   DesignOptions& design = wish.design;
-  const double wide = design.light.image_width > 0.0 ? design.light.image_width : design.width;
+  const double wide = picture_width(design);
   const double far = design.focal_length;
   if (0.5 * far >= kNearest * std::max(size_of(design, picture).maxCoeff(), wide)) {
     design.focal_length *= 0.5;
@@ -268,9 +295,8 @@ Variant quicker(const ProposalWish& asked, const Eigen::Vector2i& picture) {
   ProposalWish& wish = variant.wish;
   wish.sized = true;
   wish.pixelled = false;
-  wish.design.width *= 0.5;
+  wish.design = resized(wish.design, 0.5, picture);
   wish.design.focal_length *= 0.5;
-  wish.design.light.image_width *= 0.5;
   wish = completed(std::move(wish), picture);
   return variant;
 }

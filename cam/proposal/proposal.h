@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "cam/plan/cam_options.h"
-#include "cam/plan/sheets.h"
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"

@@ -3,9 +3,11 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -211,6 +213,19 @@ struct Stock {
   [[nodiscard]] Eigen::AlignedBox3d box(const Eigen::AlignedBox3d& surface) const;
   friend bool operator==(const Stock&, const Stock&) = default;
 };
+
+/// Thicknesses in which sheets of acrylic are sold, mm.
+inline constexpr std::array kSheetsOnSale{2.0,  3.0,  4.0,  5.0,  6.0,  8.0,
+                                          10.0, 12.0, 15.0, 20.0, 25.0, 30.0};
+
+/// The thinnest of these sheets that is as high as a blank; 0 if none is. mm
+inline double thinnest_sheet(std::span<const double> sheets, double height) {
+  double thinnest = 0.0;
+  for (const double sheet : sheets) {
+    if (sheet >= height && (thinnest == 0.0 || sheet < thinnest)) thinnest = sheet;
+  }
+  return thinnest;
+}
 
 /// A box that no part of the tool may enter: a clamp, a vice's jaw. mm, lens frame.
 struct KeepOut {

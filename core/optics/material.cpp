@@ -12,17 +12,13 @@
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/optics/optical_setup.h"
 #include "core/text/number_text.h"
 #include "core/text/read_numbers.h"
 #include "core/text/words.h"
 
 namespace lensforge {
 namespace {
-
-/// Fraunhofer's lines d, F and C, nm.
-constexpr double kLineD = 587.56;
-constexpr double kLineF = 486.13;
-constexpr double kLineC = 656.27;
 
 constexpr double kNmPerMicron = 1000.0;
 constexpr std::uintmax_t kMaxFile = 1 << 20;
@@ -105,8 +101,7 @@ OpticalMaterial read_material(const std::string& file, const std::string& option
                      ": must have two lines at least of a wavelength in µm and an index, "
                      "as 0.5876,1.4906");
   }
-  const double nm = kLineD;
-  if (samples.front().nm > nm || samples.back().nm < nm) {
+  if (samples.front().nm > kLineD || samples.back().nm < kLineD) {
     throw InputError(what + ": its wavelengths must reach from below to above 0.58756 µm, has " +
                      number_text(samples.front().nm / kNmPerMicron) + " to " +
                      number_text(samples.back().nm / kNmPerMicron));

@@ -22,11 +22,6 @@
 namespace lensforge {
 namespace {
 
-/// Fraunhofer's lines, nm.
-constexpr double kLineF = 486.13;
-constexpr double kLineD = 587.56;
-constexpr double kLineC = 656.27;
-
 constexpr double inverse_square(double x) { return 1.0 / (x * x); }
 
 }  // namespace

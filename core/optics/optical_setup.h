@@ -19,6 +19,11 @@ class Description;
 inline constexpr double kMinAbbe = 10.0;
 inline constexpr double kMaxAbbe = 200.0;
 
+/// Fraunhofer's lines, nm, by which index and Abbe number are stated.
+inline constexpr double kLineF = 486.13;
+inline constexpr double kLineD = 587.56;
+inline constexpr double kLineC = 656.27;
+
 /// A material's refractive index by wavelength. Acrylic has an Abbe number of about 57.
 struct Dispersion {
   double n_d = 1.49;   ///< At the helium line d, 587.56 nm.

@@ -149,6 +149,34 @@ void validate(const DesignOptions& options, const Image& target);
 /// @throw InputError if it is all black.
 SourceShape shape_of(const Image& picture);
 
+/// What `--lamp` may be, for help.
+inline constexpr const char* kLampWords = "sun|led:3mm@600mm|torch|laser:532nm|projector|FILE:...";
+
+/// Sets source, its size or angle and, for a laser, the wavelength, to those of a lamp:
+/// - "sun": parallel light of 9.3 mrad;
+/// - "led", "led:3mm@600mm": a flat disc of that diameter, that far in front of the lens's middle;
+/// - "torch": that of a telephone, 2 mm at 1 m; "projector": its lens, 12 mm at 2 m;
+/// - "laser", "laser:532nm": a widened beam, parallel light of one wavelength;
+/// - "FILE:3mm@600mm", "FILE:9.3mrad": a picture of the lamp, as wide as that.
+/// @throw InputError naming option, text and rule.
+void set_lamp(LightOptions& light, const std::string& text);
+
+/// Puts the lamp of the options before a finished lens; a parallel one shines straight on a lens,
+/// and from where light came so far on a mirror.
+/// @throw InputError naming `--lamp` if a mirror was made for a point source and the lamp is none,
+///        or the other way round.
+void put_lamp(const LightOptions& light, OpticalSetup& setup);
+
+/// Sets index and Abbe number to those of a material (material_named()), if it names one: the index
+/// at 587.56 nm, or at the wavelength of `light` if its lamp is a laser.
+/// @throw InputError naming option, text and rule.
+void set_material(const std::string& text, const LightOptions& light, double& ior, double& abbe);
+
+/// Reads the shape of a source from LightOptions::source_picture, if there is one.
+/// @return what was changed in the picture. @throw InputError; Interrupted.
+std::vector<std::string> read_lamp(LightOptions& light, const Background& background,
+                                   const RunControl& control);
+
 /// Reads the height map of `--front FILE`. @throw InputError naming the file and its fault, or the
 /// option if there is no such file.
 std::shared_ptr<const HeightSpline> front_from(const std::string& file, const RunControl& control);
@@ -164,6 +192,11 @@ bool follows_waves(const DesignOptions& options, const OpticalSetup& setup);
 
 /// The waves of a design.
 WaveOptions wave_options(const DesignOptions& options, const OpticalSetup& setup);
+
+/// Width of the picture on the screen, mm: as stated, or the lens's.
+inline double picture_width(const DesignOptions& options) {
+  return options.light.image_width > 0.0 ? options.light.image_width : options.width;
+}
 
 /// Extent of the options' source.
 SourceExtent source_extent(const LightOptions& light);

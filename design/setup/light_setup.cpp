@@ -8,19 +8,25 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <system_error>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "core/compute/scalar.h"
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/rasters.h"
 #include "core/optics/front.h"
 #include "core/optics/light_path.h"
 #include "core/optics/light_source.h"
+#include "core/optics/material.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
 #include "core/text/read_numbers.h"
+#include "core/text/words.h"
 #include "design/setup/design_options.h"
 
 namespace lensforge {
@@ -531,6 +537,84 @@ void require_unshaded(const DesignOptions& o, const Eigen::Vector2i& pixels,
                     (free.empty() ? "a smaller --image-width" : free) + " works");
 }
 
+// What stands for other options.
+
+constexpr const char* kLamp = "--lamp";
+constexpr double kSunAngle = 9.3;  ///< mrad
+constexpr double kLaserNm = 532.0;
+
+[[noreturn]] void refuse_lamp(const std::string& text, const std::string& rule) {
+  throw InputError(std::string(kLamp) + " '" + printable_line(text) + "': " + rule);
+}
+
+/// The number before a unit; none if the text does not end in it.
+std::optional<double> number_before(std::string_view text, std::string_view unit,
+                                    const std::string& whole) {
+  if (!text.ends_with(unit)) return std::nullopt;
+  text.remove_suffix(unit.size());
+  return parse_numbers(text, std::string(kLamp) + " '" + printable_line(whole) + "'", 1)[0];
+}
+
+void set_disc(LightOptions& light, double diameter, double distance, const std::string& text) {
+  if (!(diameter >= kMinSourceWidth && diameter <= kMaxSourceSize)) {
+    refuse_lamp(text, "its diameter must be " +
+                          Limits::between(kMinSourceWidth, kMaxSourceSize).rule() +
+                          " mm; led:3mm@600mm works");
+  }
+  if (!(distance >= kMinThickness && distance <= kMaxFocalLength)) {
+    refuse_lamp(text, "its distance from the lens must be " +
+                          Limits::between(kMinThickness, kMaxFocalLength).rule() +
+                          " mm; led:3mm@600mm works");
+  }
+  light.source = SourceKind::kPoint;
+  light.emission = Emission::kLambertian;
+  light.source_size = diameter;
+  light.source_distance = distance;
+}
+
+/// "3mm@600mm"
+void set_disc(LightOptions& light, std::string_view size, const std::string& text) {
+  const std::size_t at = size.find('@');
+  if (at == std::string_view::npos) {
+    refuse_lamp(text, "must state diameter and distance of the lamp; led:3mm@600mm works");
+  }
+  const std::string name = std::string(kLamp) + " '" + printable_line(text) + "'";
+  set_disc(light, parse_length_mm(size.substr(0, at), name),
+           parse_length_mm(size.substr(at + 1), name), text);
+}
+
+void set_parallel(LightOptions& light, double mrad, const std::string& text) {
+  if (!(mrad >= kMinSourceWidth && mrad <= kMaxSourceAngle)) {
+    refuse_lamp(text, "its angle must be " +
+                          Limits::between(kMinSourceWidth, kMaxSourceAngle).rule() +
+                          " mrad; the sun has 9.3");
+  }
+  light.source_angle = mrad;
+}
+
+void set_laser(LightOptions& light, std::string_view wavelength, const std::string& text) {
+  const std::optional<double> nm =
+      wavelength.empty() ? kLaserNm : number_before(wavelength, "nm", text);
+  if (!nm || !(*nm >= kMinWavelength && *nm <= kMaxWavelength)) {
+    refuse_lamp(text, "its wavelength must be " +
+                          Limits::between(kMinWavelength, kMaxWavelength).rule() +
+                          " nm; laser:532nm works");
+  }
+  light.wavelength_nm = *nm;
+}
+
+void set_picture(LightOptions& light, const std::string& file, std::string_view size,
+                 const std::string& text) {
+  light.source_picture = file;
+  const std::optional<double> mrad = number_before(size, "mrad", text);
+  if (mrad)
+    set_parallel(light, *mrad, text);
+  else
+    set_disc(light, size, text);
+}
+
+bool is_laser(const LightOptions& light) { return light.lamp.starts_with("laser"); }
+
 }  // namespace
 
 SourceExtent source_extent(const LightOptions& light) {
@@ -558,6 +642,56 @@ SourceShape shape_of(const Image& picture) {
   }
   for (double& weight : shape.weights) weight = std::max(0.0, weight / most);
   return shape;
+}
+
+void set_lamp(LightOptions& light, const std::string& text) {
+  light.lamp = text;
+  if (text.empty()) return;
+  const std::size_t colon = text.rfind(':');
+  const std::string kind = text.substr(0, colon);
+  const std::string_view rest =
+      colon == std::string::npos ? std::string_view() : std::string_view(text).substr(colon + 1);
+  if (text == "sun") return set_parallel(light, kSunAngle, text);
+  if (text == "led") return set_disc(light, 3.0, 600.0, text);
+  if (text == "torch") return set_disc(light, 2.0, 1000.0, text);
+  if (text == "projector") return set_disc(light, 12.0, 2000.0, text);
+  if (kind == "led") return set_disc(light, rest, text);
+  if (kind == "laser") return set_laser(light, rest, text);
+  if (!rest.empty()) return set_picture(light, kind, rest, text);
+  refuse_lamp(
+      text,
+      "must be sun, led:3mm@600mm, torch, laser:532nm, projector, or a picture of the lamp and "
+      "its width, as lamp.png:9.3mrad or lamp.png:3mm@600mm");
+}
+
+void put_lamp(const LightOptions& light, OpticalSetup& setup) {
+  const bool point = light.source == SourceKind::kPoint;
+  const bool lens = !traits(setup.body).lit_from_above;
+  if (!lens && point != lamp_place(setup.lamp).has_value()) {
+    refuse_lamp(light.lamp, std::string("the ") + traits(setup.body).name + " was made for " +
+                                traits(setup.lamp).name + "; leave it out");
+  }
+  if (lens && point) {
+    setup.lamp = PointSource{place_of_source(light, setup.lens_size).value(), light.emission};
+  } else if (lens) {
+    setup.lamp = ParallelLight{};
+  }
+  setup.extent = source_extent(light);
+}
+
+void set_material(const std::string& text, const LightOptions& light, double& ior, double& abbe) {
+  if (text.empty()) return;
+  const OpticalMaterial material = material_named(text, "--material");
+  ior = material.index(is_laser(light) ? light.wavelength_nm : kLineD);
+  abbe = material.abbe();
+}
+
+std::vector<std::string> read_lamp(LightOptions& light, const Background& background,
+                                   const RunControl& control) {
+  if (light.source_picture.empty()) return {};
+  LoadedImage picture = read_image(light.source_picture, control, kDrawnSide, background);
+  light.source_shape = shape_of(picture.image);
+  return std::move(picture.changes);
 }
 
 std::shared_ptr<const HeightSpline> front_from(const std::string& file, const RunControl& control) {

@@ -14,7 +14,6 @@
 #include "core/text/words.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"
-#include "design/setup/lamps.h"
 
 namespace lensforge {
 namespace {
@@ -126,7 +125,10 @@ void describe(Description& d, DesignOptions& o) {
   describe_lamp(d, o.light);
   d.text(
       material_spec(), [&o] { return o.material; },
-      [&o](const std::string& text) { set_material(o, text); });
+      [&o](const std::string& text) {
+        o.material = text;
+        set_material(text, o.light, o.ior, o.light.spectrum.abbe);
+      });
   d.length("--width", o.width, Limits::between(kMinLensWidth, kMaxLensWidth),
            "lens width; the height follows the picture")
       .essential = true;
@@ -285,12 +287,8 @@ void describe(Description& d, RenderOptions& o) {
   d.text(
       material_spec(), [&o] { return o.material; },
       [&o](const std::string& text) {
-        DesignOptions stated;
-        stated.light = o.light;
-        set_material(stated, text);
         o.material = text;
-        o.setup.ior = stated.ior;
-        o.setup.spectrum.abbe = stated.light.spectrum.abbe;
+        set_material(text, o.light, o.setup.ior, o.setup.spectrum.abbe);
       });
   d.word("--model", o.model, named_models(),
          "surface model of the picture; a lens has its own default, a solid is smooth");

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "design/setup/lamps.h"
 
 namespace lensforge {
 namespace {
@@ -79,6 +78,22 @@ TEST(Proposal, HoursLimitTheWidth) {
   EXPECT_DOUBLE_EQ(first.forecast.contrast, 0.0);  // The picture has no dark pixel.
   EXPECT_GE(first.forecast.sheet, first.design.thickness + first.forecast.relief);
   for (const Proposal& other : proposals) EXPECT_GT(other.forecast.sheet, 0.0);
+}
+
+TEST(Proposal, ATrialIsLitAsTheLensIs) {
+  ProposalWish wish;
+  wish.sized = wish.pixelled = true;
+  wish.design.width = 40.0;
+  wish.design.focal_length = 120.0;
+  wish.design.pixels = 128;
+  wish.design.light.source = SourceKind::kPoint;
+  wish.design.light.source_distance = 100.0;
+  const Image picture = disc(128);
+  const Executor executor = Executor::cpu();
+  const double expected = propose(picture, wish, executor, {}).front().forecast.relief;
+  wish.design.light.source_distance = 0.0;
+  wish.design.light.source_position = Eigen::Vector3d(20.0, 20.0, -100.0);
+  EXPECT_DOUBLE_EQ(propose(picture, wish, executor, {}).front().forecast.relief, expected);
 }
 
 TEST(Proposal, ContradictionsAreRefused) {

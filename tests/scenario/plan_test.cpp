@@ -9,6 +9,7 @@ namespace {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Plan : public Scenario {};
 
@@ -60,6 +61,18 @@ TEST_F(Plan, SaysWhatToExpectInWords) {
                            "lensforge design ", "--lamp led:3mm@600mm", "lensforge cam lens"}) {
     EXPECT_THAT(outcome.out, HasSubstr(part));
   }
+}
+
+TEST_F(Plan, ItsCommandKeepsWhatWasGivenBesideLampAndMaterial) {
+  const Outcome outcome =
+      run({"plan", picture("rings.png"), "--lamp", "led:3mm@600mm", "--source-size", "1.5",
+           "--material", "pc", "--ior", "1.6", "--width", "10", "--focal", "60", "--pixels", "16"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("--lamp led:3mm@600mm"));
+  EXPECT_THAT(outcome.out, HasSubstr("--material pc"));
+  EXPECT_THAT(outcome.out, HasSubstr("--source-size 1.5"));
+  EXPECT_THAT(outcome.out, HasSubstr("--ior 1.6"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("--emission")));
 }
 
 TEST_F(Plan, WhatCannotBeIsRefusedInOneLine) {

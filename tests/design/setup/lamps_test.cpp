@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/setup/lamps.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 #include "core/error.h"
 #include "core/optics/material.h"
 #include "core/schema/description.h"
+#include "design/setup/design_options.h"
 #include "design/setup/option_tables.h"
 
 namespace lensforge {
@@ -82,7 +81,7 @@ TEST(Lamp, OptionsThatFollowWin) {
 TEST(Lamp, ALasersMaterialHasTheIndexAtItsWavelength) {
   DesignOptions options;
   set_lamp(options.light, "laser:450nm");
-  set_material(options, "glass-bk7");
+  set_material("glass-bk7", options.light, options.ior, options.light.spectrum.abbe);
   EXPECT_DOUBLE_EQ(options.ior, material_named("glass-bk7", "").index(450.0));
 }
 
