@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/schema/description.h"
+#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/program_seal.h"
@@ -46,7 +47,8 @@ constexpr double kMaxMargin = 100000;
 
 void describe_controller(Description& d, SendOptions& o) {
   d.text("--port", o.port, "PORT",
-         "controller: /dev/ttyUSB0[:115200], tcp:HOST:PORT or sim:[grbl|grblhal]");
+         "controller: /dev/ttyUSB0[:115200], tcp:HOST:PORT, or simulated: sim:[grbl|grblhal], "
+         "with @1x at real speed");
   d.word("--dialect", o.dialect, {{"grbl", "grbl"}, {"grblhal", "grblhal"}},
          "dialect that a --dry-run without --port checks");
   d.flag("--home", o.home, "home the machine first");
@@ -157,10 +159,27 @@ struct MachinePort {
 /// Position of the part in the simulated mill of 400 x 300 x 100 mm.
 const Eigen::Vector3d kSimulatedOrigin(-350.0, -250.0, -60.0);
 
-SimulatedOptions simulated_options(const std::string& name) {
-  return parse_dialect(name.empty() ? "grbl" : name, "--port sim:").name == "grbl"
-             ? simulated_grbl()
-             : simulated_grblhal();
+/// Most simulated seconds per second.
+constexpr double kTopPace = 1000.0;
+
+/// Reads "", "grbl", "grblhal@1x", "@20x". @throw InputError naming --port, value and rule.
+std::unique_ptr<SimulatedMachine> simulated_machine(const std::string& text) {
+  const std::size_t at = text.find('@');
+  WireOptions wire;
+  if (at != std::string::npos) {
+    const std::string pace = text.substr(at + 1);
+    const bool times = pace.ends_with('x');
+    if (times) {
+      wire.pace = parse_numbers(pace.substr(0, pace.size() - 1), "--port sim:" + text, 1).front();
+    }
+    if (!(wire.pace > 0.0 && wire.pace <= kTopPace)) {
+      throw InputError("--port sim:" + printable_line(text) +
+                       ": the speed must be above 0x, at most 1000x; sim:grbl@1x works");
+    }
+  }
+  const std::string name = text.substr(0, at);
+  const bool grbl = parse_dialect(name.empty() ? "grbl" : name, "--port sim:").name == "grbl";
+  return std::make_unique<SimulatedMachine>(grbl ? simulated_grbl() : simulated_grblhal(), wire);
 }
 
 /// Opens a serial port, a TCP connection or a simulated mill.
@@ -170,7 +189,7 @@ MachinePort open_machine_port(const std::string& text, const std::stop_token& st
   port.spec = parse_port_spec(text);
   switch (port.spec.kind) {
     case PortSpec::Kind::kSimulated:
-      port.machine = std::make_unique<SimulatedMachine>(simulated_options(port.spec.place));
+      port.machine = simulated_machine(port.spec.place);
       for (int i = 0; i < 6; ++i) port.machine->controller().set_origin(i, kSimulatedOrigin);
       port.link = port.machine->open();
       return port;

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/batch/job_run.h"
 
-#include <fcntl.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -24,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/frame/child_command.h"
 #include "app/frame/command_line.h"
 #include "core/error.h"
 #include "core/io/files.h"
@@ -34,123 +28,6 @@ namespace lensforge::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Result of a command that ran in its own process.
-struct StepEnd {
-  int exit_code = 0;  ///< 128 + the signal's number if a signal ended it.
-  double seconds = 0.0;
-};
-
-constexpr int kSignalBase = 128;
-constexpr int kCannotStart = 127;
-
-[[noreturn]] void fail(const std::string& what) {
-  throw RunError(what + ": " + system_reason(errno));
-}
-
-Descriptor open_output(const fs::path& path, int how) {
-  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | how, 0644));
-  if (!file.open()) fail(path.string());
-  return file;
-}
-
-/// Arguments of execv().
-struct CommandLine {
-  explicit CommandLine(const Arguments& words) : words_(words) {
-    for (std::string& word : words_) pointers_.push_back(word.data());
-    pointers_.push_back(nullptr);
-  }
-  [[nodiscard]] char* const* pointers() const { return pointers_.data(); }
-
- private:
-  Arguments words_;
-  std::vector<char*> pointers_;
-};
-
-/// Holds back the signals that stop a program while it lives. Between fork() and execv() they would
-/// end in the parent's handlers, and be lost.
-class StopsHeld {
- public:
-  StopsHeld() {
-    sigset_t stops;
-    sigemptyset(&stops);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&stops, signal);
-    ::pthread_sigmask(SIG_BLOCK, &stops, &before_);
-  }
-  ~StopsHeld() { release(); }
-  StopsHeld(const StopsHeld&) = delete;
-  StopsHeld& operator=(const StopsHeld&) = delete;
-
-  void release() const { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-
- private:
-  sigset_t before_{};
-};
-
-/// Starts the program in the child, with only the calls allowed between fork() and execv(). The
-/// child has its own process group: Ctrl-C on the terminal reaches it once, through the parent.
-[[noreturn]] void become(const char* program, const CommandLine& command,
-                         const std::array<int, 3>& streams, pid_t parent, const StopsHeld& held) {
-  ::setpgid(0, 0);
-  ::prctl(PR_SET_PDEATHSIG, SIGINT);
-  if (::getppid() != parent) ::_exit(kCannotStart);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXFSZ}) {
-    std::signal(signal, signal == SIGXFSZ || signal == SIGPIPE ? SIG_IGN : SIG_DFL);
-  }
-  held.release();
-  ::dup2(streams[0], STDIN_FILENO);
-  ::dup2(streams[1], STDOUT_FILENO);
-  ::dup2(streams[2], STDERR_FILENO);
-  ::execv(program, command.pointers());
-  ::_exit(kCannotStart);
-}
-
-int wait_for(pid_t child, const std::stop_token& stop) {
-  {
-    // Reaped only after the last possible signal: its number could then belong to another process.
-    const std::stop_callback interrupt(stop, [child] { ::kill(child, SIGINT); });
-    siginfo_t ended{};
-    while (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0) {
-      if (errno != EINTR) fail("waitid");
-    }
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : kSignalBase + WTERMSIG(status);
-}
-
-/// The words that start a command, the first a program's path.
-Arguments program_of(const BatchPlace& place) {
-  if (!place.program.empty()) return place.program;
-  return {fs::read_symlink("/proc/self/exe").string()};
-}
-
-/// Runs the program with `words`, its output going to two files: `out` is replaced, `log` is added
-/// to. When `stop` is requested, or the calling thread ends, it is interrupted as by Ctrl-C.
-/// @throw RunError with the system's reason if no process can be made or a file not be written.
-StepEnd run_step(Arguments program, const Arguments& words, const fs::path& out,
-                 const fs::path& log, const std::stop_token& stop) {
-  const auto start = std::chrono::steady_clock::now();
-  program.insert(program.end(), words.begin(), words.end());
-  const CommandLine command(program);
-  const Descriptor result = open_output(out, O_TRUNC);
-  const Descriptor messages = open_output(log, O_APPEND);
-  const Descriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
-  const pid_t parent = ::getpid();
-  pid_t child = -1;
-  {
-    const StopsHeld held;
-    child = ::fork();
-    if (child == 0) {
-      become(program.front().c_str(), command,
-             {nothing.number(), result.number(), messages.number()}, parent, held);
-    }
-  }
-  if (child < 0) fail("fork");
-  const int code = wait_for(child, stop);
-  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-  return {code, spent.count()};
-}
 
 using nlohmann::json;
 using Status = JobOutcome::Status;
@@ -292,8 +169,8 @@ class JobWork {
     const fs::path log = folder_ / kJobLog;
     std::error_code ignored;
     const std::uintmax_t before = fs::exists(log, ignored) ? fs::file_size(log, ignored) : 0;
-    const StepEnd end =
-        run_step(program_of(place_), words_of(step), folder_ / kStepOutput, log, stop_);
+    const ChildEnd end =
+        run_child({place_.program, words_of(step), folder_ / kStepOutput, log}, stop_);
     if (stop_.stop_requested() && end.exit_code == kInterrupted) {
       return JobOutcome{Status::kInterrupted, "", false, end.seconds};
     }

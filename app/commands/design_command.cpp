@@ -2,7 +2,6 @@
 #include "app/commands/design_command.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
@@ -27,6 +26,7 @@
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
 #include "app/view/live_server.h"
+#include "app/view/loopback_server.h"
 #include "cam/cam.h"
 #include "cam/plan/cam_options.h"
 #include "cam/workshop/workshop.h"
@@ -284,17 +284,6 @@ void require_finished(const fs::path& folder, const EarlierDesign& earlier,
 std::string picture_bytes(const Image& image) {
   const std::vector<unsigned char> png = encode_png(grey_picture(image));
   return {png.begin(), png.end()};
-}
-
-/// The port that --live names. @throw InputError unless it is a whole number from 0 to 65535.
-int live_port(const std::string& text) {
-  constexpr int kLargest = 65535;
-  int port = -1;
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, port);
-  if (error == std::errc() && stop == end && port >= 0 && port <= kLargest) return port;
-  throw InputError("--live " + printable_line(text) +
-                   ": must be a port, 1 to 65535, or 0 for a free one; 8080 works");
 }
 
 /// Shows a running design to browsers on this machine. A thread of its own looks at what the design
@@ -566,8 +555,8 @@ std::unique_ptr<LiveDesign> live_page(const DesignSettings& settings, const Imag
   Image target = working_picture(picture, design, {});
   const OpticalSetup setup = optical_setup(design, {target.columns(), target.rows()});
   auto page = std::make_unique<LiveDesign>(
-      live_port(settings.live), fs::path(settings.out).filename().string(), design.checkpoint,
-      DesignGoalView{std::move(target), setup, design.model});
+      loopback_port("--live", settings.live), fs::path(settings.out).filename().string(),
+      design.checkpoint, DesignGoalView{std::move(target), setup, design.model});
   console.note("the design is shown at " + page->address());
   return page;
 }
@@ -629,7 +618,7 @@ void note_begin(const DesignSettings& settings, const LoadedImage& loaded,
 CommandResult run(CommandFrame& frame, DesignSettings& settings) {
   const Console& console = frame.console();
   const EarlierDesign earlier = EarlierDesign::in(settings.out);
-  if (!settings.live.empty()) live_port(settings.live);
+  if (!settings.live.empty()) loopback_port("--live", settings.live);
   refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
   const LoadedImage loaded = read_pictures(frame, settings);
   DesignOptions& design = settings.design;

@@ -14,6 +14,7 @@
 #include "core/image/image_io.h"
 #include "core/optics/picture_blur.h"
 #include "core/page/html_page.h"
+#include "core/schema/json.h"
 #include "core/schema/option_text.h"
 #include "core/text/number_text.h"
 #include "core/text/read_numbers.h"
@@ -74,8 +75,8 @@ std::vector<double> sheets_of(const std::string& text) {
   return sheets;
 }
 
-/// The options of a proposal that differ from those of its lamp and material, as typed.
-std::string options_of(const Proposal& proposal) {
+/// The options of a proposal that differ from those of its lamp and material.
+OptionValues options_of(const Proposal& proposal) {
   const std::set<std::string> always{"--width", "--focal", "--pixels"};
   DesignOptions design = proposal.design;
   DesignOptions usual;
@@ -83,12 +84,24 @@ std::string options_of(const Proposal& proposal) {
   usual.light.lamp.clear();  // It is to be named.
   set_material(design.material, usual.light, usual.ior, usual.light.spectrum.abbe);
   const Description without = known(usual);
-  std::string text;
+  OptionValues values;
   for (const Field& field : known(design)) {
     if (!always.contains(field.name) && field.get() == without.at(field.name).get()) continue;
-    text += " " + field.name + " " + shell_word(value_text(field.get()));
+    values[field.name] = field.get();
   }
+  return values;
+}
+
+std::string typed(const OptionValues& values) {
+  std::string text;
+  for (const auto& [name, value] : values) text += " " + name + " " + shell_word(value_text(value));
   return text;
+}
+
+nlohmann::json values_json(const OptionValues& values) {
+  nlohmann::json object = nlohmann::json::object();
+  for (const auto& [name, value] : values) object[name] = lensforge::json_of(value);
+  return object;
 }
 
 struct Commands {
@@ -98,7 +111,8 @@ struct Commands {
 
 Commands commands_of(const Proposal& proposal, const PlanSettings& settings) {
   const bool own = settings.made_by != "default";
-  return {"lensforge design " + shell_word(settings.target) + options_of(proposal) + " --out lens",
+  return {"lensforge design " + shell_word(settings.target) + typed(options_of(proposal)) +
+              " --out lens",
           std::string("lensforge cam lens") +
               (own ? " --workshop " + shell_word(settings.made_by) : "")};
 }
@@ -128,6 +142,7 @@ nlohmann::json json_of(const Proposal& proposal, const PlanSettings& settings) {
           {"operations", operations},
           {"minutes", f.minutes()},
           {"design_seconds", f.design_seconds},
+          {"options", values_json(options_of(proposal))},
           {"commands", {commands.design, commands.cam}}};
 }
 
@@ -165,7 +180,7 @@ std::string text_of(const Proposal& proposal, const PlanSettings& settings) {
 
 CommandResult run(CommandFrame& frame, PlanSettings& settings) {
   OptionSet& options = frame.options();
-  frame.begin();
+  frame.begin_file();
   ProposalWish& wish = settings.wish;
   wish.sized = options.given("--width");
   wish.pixelled = options.given("--pixels");

@@ -38,6 +38,8 @@ void describe(Description& d, SendSettings& settings) {
   d.text("FILE", settings.file, "", "G-code program").needed = true;
   describe(d, settings.job);
   d.flag("--yes", settings.yes, "do not ask before resuming");
+  d.flag("--keys", settings.keys,
+         "take keys from standard input though it is no terminal, for a program that sends");
   d.text("--log", settings.log, "FILE",
          "log file, appended to an earlier one; default FILE.ngc.log");
   d.text("--events", settings.events, "FILE",
@@ -212,8 +214,8 @@ void require_consent(const std::stop_token& stop) {
 
 /// The job before the operator's eyes and under the keys.
 struct Operator {
-  Operator(bool quiet, const JobView& job)
-      : left(job), keys(&InterruptWatch::interrupt), view(quiet, job) {}
+  Operator(bool quiet, const JobView& job, KeySource source)
+      : left(job), keys(&InterruptWatch::interrupt, source), view(quiet, job) {}
 
   TimeLeft left;
   TerminalKeys keys;
@@ -295,9 +297,11 @@ class JobConsole : public JobWatcher {
   void began(const SendSummary& so_far, std::int64_t first_byte) override {
     const ControllerInfo& info = *so_far.controller;
     const JobView job{so_far.job.bytes,          so_far.facts.lines,  first_byte,
-                      so_far.facts.time.seconds, info.planner_blocks, info.rx_bytes};
+                      so_far.facts.time.seconds, info.planner_blocks, info.rx_bytes,
+                      info.start.origins[0]};
     events_->begin(so_far.job, job);
-    operator_.emplace(options_.common().quiet, job);
+    operator_.emplace(options_.common().quiet, job,
+                      settings_.keys ? KeySource::kAnyInput : KeySource::kTerminal);
     if (operator_->keys.active()) console_.note("keys: " + std::string(kKeyHelp));
   }
   void took(const SendEvent& event) override {

@@ -15,6 +15,7 @@ struct SendSettings {
   std::string log;     ///< FILE.log if empty.
   std::string events;  ///< Destination of the JSON lines; none if empty.
   bool yes = false;    ///< Do not ask before resuming.
+  bool keys = false;   ///< Take keys from standard input even if it is no terminal.
   SendOptions job;
 
   [[nodiscard]] bool has_log() const { return !job.dry_run || !log.empty(); }

@@ -494,6 +494,7 @@ void JobEvents::begin(const JobIdentity& job, const JobView& view) {
   object["lines"] = view.lines;
   object["bytes"] = view.bytes;
   object["estimate"] = view.estimate;
+  object["origin"] = {view.origin.x(), view.origin.y(), view.origin.z()};
   write(std::move(object));
 }
 

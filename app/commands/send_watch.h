@@ -26,6 +26,7 @@ struct JobView {
   double estimate = 0.0;        ///< Run time of the whole program, s.
   int planner_blocks = 0;       ///< 0 if not known.
   int rx_bytes = 0;             ///< 0 if not known.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< Of the program in the machine (G54), mm.
 };
 
 /// "1:02:03"

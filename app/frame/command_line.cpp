@@ -282,6 +282,8 @@ struct Subcommand {
 };
 
 constexpr std::array kSubcommands{
+    Subcommand{"studio", studio_command, "studio [FOLDER]",
+               "a page that leads from a picture to a part"},
     Subcommand{"plan", plan_command, "plan PICTURE",
                "what lens this picture, lamp and wall ask for"},
     Subcommand{"design", design_command, "design TARGET --out DIR", "picture to lens folder"},

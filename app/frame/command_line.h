@@ -26,6 +26,7 @@ int nest_command(const Arguments& arguments);
 int coupon_command(const Arguments& arguments);
 int export_command(const Arguments& arguments);
 int send_command(const Arguments& arguments);
+int studio_command(const Arguments& arguments);
 int reflect_command(const Arguments& arguments);
 int plan_command(const Arguments& arguments);
 int view_command(const Arguments& arguments);

@@ -109,7 +109,10 @@ void Console::result(const nlohmann::json& object, const std::string& text) cons
 namespace {
 
 constexpr std::chrono::milliseconds kBarInterval{100};
-constexpr std::chrono::seconds kLineInterval{5};
+/// Lines where there is no terminal: often enough to follow short work, and a log of hours short.
+constexpr double kLineShare = 0.02;  ///< Of the time so far.
+constexpr double kMinLineSeconds = 1.0;
+constexpr double kMaxLineSeconds = 5.0;
 constexpr int kMaxBarWidth = 24;
 constexpr int kMinBarWidth = 8;  ///< With less room there is no bar.
 constexpr int kBarEnds = 3;      ///< Characters around the bar.
@@ -227,10 +230,14 @@ std::string ProgressDisplay::line(double seconds) const {
 
 void ProgressDisplay::draw() {
   const Clock::time_point now = Clock::now();
-  const Clock::duration wait = terminal_ ? Clock::duration(kBarInterval) : kLineInterval;
+  const std::chrono::duration<double> spent = now - start_;
+  const std::chrono::duration<double> wait =
+      terminal_ ? kBarInterval
+                : std::chrono::duration<double>(
+                      std::clamp(kLineShare * spent.count(), kMinLineSeconds, kMaxLineSeconds));
   if (now - shown_ < wait) return;
   shown_ = now;
-  const std::string text = line(std::chrono::duration<double>(now - start_).count());
+  const std::string text = line(spent.count());
   if (terminal_) {
     std::fprintf(stderr, "\r%s\033[K", text.c_str());
     bar_drawn_ = true;

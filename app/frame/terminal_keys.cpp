@@ -34,6 +34,9 @@ struct sigaction continue_before;                 // NOLINT: see above
 /// this one (SIGTTOU).
 bool in_foreground() { return ::tcgetpgrp(STDIN_FILENO) == ::getpgrp(); }
 
+/// What is no terminal belongs to who opened it.
+bool may_read() { return ::isatty(STDIN_FILENO) == 0 || in_foreground(); }
+
 void take_terminal() {
   if (taken && in_foreground()) ::tcsetattr(STDIN_FILENO, TCSANOW, &during);
 }
@@ -148,12 +151,14 @@ std::optional<OperatorKey> order_of(char key) {
 
 }  // namespace
 
-TerminalKeys::TerminalKeys(std::function<void()> abort) : abort_(std::move(abort)) {
+TerminalKeys::TerminalKeys(std::function<void()> abort, KeySource source)
+    : abort_(std::move(abort)) {
   std::array<int, 2> wake{};
   if (::pipe2(wake.data(), O_CLOEXEC) != 0) return;
   wake_read_ = Descriptor(wake[0]);
   wake_write_ = Descriptor(wake[1]);
-  if (enter()) reader_ = std::thread([this] { read_keys(); });
+  const bool pipe = source == KeySource::kAnyInput && ::isatty(STDIN_FILENO) == 0;
+  if (pipe || enter()) reader_ = std::thread([this] { read_keys(); });
 }
 
 TerminalKeys::~TerminalKeys() {
@@ -176,7 +181,7 @@ std::optional<OperatorKey> TerminalKeys::next() {
 void TerminalKeys::read_keys() {
   block_terminal_signals();
   for (;;) {
-    const bool ours = in_foreground();
+    const bool ours = may_read();
     std::array<pollfd, 2> sources{pollfd{wake_read_.number(), POLLIN, 0},
                                   pollfd{ours ? STDIN_FILENO : -1, POLLIN, 0}};
     if (::poll(sources.data(), sources.size(), kForegroundCheckMs) < 0 && errno != EINTR) return;
@@ -185,7 +190,7 @@ void TerminalKeys::read_keys() {
     char key = 0;
     const ssize_t count = ::read(STDIN_FILENO, &key, 1);
     if (count == 1) take(key);
-    if (count == 0 || (count < 0 && errno != EINTR && in_foreground())) return;
+    if (count == 0 || (count < 0 && errno != EINTR && may_read())) return;
   }
 }
 

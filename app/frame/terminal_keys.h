@@ -19,6 +19,12 @@ inline constexpr std::string_view kKeyHelp =
     "space or h holds, r resumes, + - = feed up, down and 100 %, 1 2 3 rapids at 100, 50 and 25 %, "
     "> < . spindle up, down and 100 %, Q (capital) ends the job like Ctrl-C";
 
+/// Source of keys.
+enum class KeySource {
+  kTerminal,  ///< Standard input, if it is a terminal.
+  kAnyInput,  ///< Standard input, whatever it is; no keys after its end.
+};
+
 /// Reads keys from the terminal on standard input, without Enter and without echo. There are no
 /// keys if standard input is no terminal or while the process is in the background. Ctrl-Z is
 /// disabled: a suspended sender does not watch the spindle. The terminal's settings are restored by
@@ -27,12 +33,12 @@ inline constexpr std::string_view kKeyHelp =
 class TerminalKeys {
  public:
   /// @param abort  called for each Q, from another thread.
-  explicit TerminalKeys(std::function<void()> abort);
+  explicit TerminalKeys(std::function<void()> abort, KeySource source = KeySource::kTerminal);
   ~TerminalKeys();
   TerminalKeys(const TerminalKeys&) = delete;
   TerminalKeys& operator=(const TerminalKeys&) = delete;
 
-  /// True if there is a terminal to read from.
+  /// True if there is something to read from.
   [[nodiscard]] bool active() const { return reader_.joinable(); }
   /// Takes the oldest pending order.
   std::optional<OperatorKey> next();

@@ -308,6 +308,8 @@ void add_waves(const fs::path& folder, const RunControl& control, LensView& view
     add(folder / lens_file::kCut / cam_file::kWall, "cut and polished");
 }
 
+}  // namespace
+
 LensRaster relief_of(const Lens& lens) {
   const auto surface = optical_surface(lens, lens.model);
   const Eigen::Vector2d size = lens.setup.lens_size;
@@ -325,8 +327,6 @@ LensRaster relief_of(const Lens& lens) {
   }
   return raster;
 }
-
-}  // namespace
 
 bool ViewedSurface::exact() const { return storage_error <= kMaxStorageError; }
 

@@ -64,6 +64,9 @@ struct LensView {
 /// Number of nodes along the longer side of a page's relief.
 inline constexpr int kReliefNodes = 240;
 
+/// Heights of a lens's surface for pictures of its relief.
+LensRaster relief_of(const Lens& lens);
+
 /// Content of a page for a lens without predictions. @pre the lens has a picture.
 LensView view_of_lens(const Lens& lens, const std::string& name, const Executor& executor);
 

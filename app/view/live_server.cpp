@@ -1,30 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/view/live_server.h"
 
-#include <algorithm>
-#include <array>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
-#include <boost/beast/http.hpp>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <exception>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "app/view/loopback_server.h"
 #include "core/error.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
@@ -39,258 +28,6 @@
 
 namespace lensforge {
 namespace {
-
-// Built on Boost.Beast: one thread that no socket blocks, a time for a whole header, a decision
-// before the body. cpp-httplib cannot hold such limits: its times are for one read, each client
-// holds one of its threads, and none of its hooks closes a client's socket.
-
-/// Request of a browser.
-struct LoopbackRequest {
-  bool post = false;      ///< GET otherwise.
-  std::string_view path;  ///< Without a query.
-};
-
-/// Answer to a request. The bytes are shared, not copied for every client.
-struct LoopbackAnswer {
-  const char* type = "";                     ///< Content-Type.
-  std::shared_ptr<const std::string> bytes;  ///< Null: there is no such page.
-};
-
-/// Serves pages to browsers on this machine by HTTP. Other sites' pages can neither read nor frame
-/// its pages, nor POST to it. It answers one request per connection by its header; bodies are
-/// discarded. Each client has 2 s for a header of at most 8 kB; of 32 connections the oldest idle
-/// one is closed for a new one.
-class LoopbackServer {
- public:
-  /// Called by the server's thread.
-  using Answer = std::function<LoopbackAnswer(const LoopbackRequest&)>;
-
-  /// @param port  0 takes a free one. @throw InputError naming --live and the port if it cannot be
-  ///              had.
-  LoopbackServer(int port, Answer answer);
-  /// Ends at once and closes all connections, whatever their clients do.
-  ~LoopbackServer();
-  LoopbackServer(const LoopbackServer&) = delete;
-  LoopbackServer& operator=(const LoopbackServer&) = delete;
-
-  [[nodiscard]] int port() const;
-
- private:
-  class Listener;
-  std::unique_ptr<Listener> listener_;
-};
-
-namespace asio = boost::asio;
-namespace http = boost::beast::http;
-using boost::beast::error_code;
-using tcp = asio::ip::tcp;
-
-/// A browser on the same machine sends a header of 1 kB at once.
-constexpr std::chrono::seconds kHeaderTime{2};
-constexpr std::uint32_t kMaxHeader = 8192;  ///< Bytes.
-/// The page sends none.
-constexpr std::size_t kMaxBody = 4096;
-/// For an answer of some MB over loopback, which takes milliseconds, to a busy browser.
-constexpr std::chrono::seconds kAnswerTime{5};
-/// A browser opens 6.
-constexpr std::size_t kMaxConnections = 32;
-/// Until the next try where the process can open no more files.
-constexpr std::chrono::milliseconds kAcceptPause{100};
-
-/// Browsers send this header for scripts of the page itself alone.
-constexpr const char* kOwnHeader = "X-Lensforge";
-
-using Request = http::request<http::empty_body>;
-
-/// A page's own address counts, whatever name led to this port: no other page may read or stop a
-/// design.
-bool is_own(std::string_view host, int port) {
-  const std::string number = std::to_string(port);
-  return host == "127.0.0.1:" + number || host == "localhost:" + number;
-}
-
-/// Error status of a complete header; ok if it is valid.
-http::status verdict(const Request& request, std::uint64_t body, int port) {
-  if (request.count(http::field::host) != 1) return http::status::bad_request;
-  const auto host = request[http::field::host];
-  if (!is_own({host.data(), host.size()}, port)) return http::status::forbidden;
-  const bool post = request.method() == http::verb::post;
-  if (!post && request.method() != http::verb::get) return http::status::method_not_allowed;
-  if (post && request.count(kOwnHeader) == 0) return http::status::forbidden;
-  if (request.chunked()) return http::status::length_required;
-  return body > kMaxBody ? http::status::payload_too_large : http::status::ok;
-}
-
-/// Status for a header that could not be read; unknown if no answer is possible.
-http::status verdict(error_code error) {
-  const error_code ended = make_error_code(http::error::end_of_stream);
-  if (error == ended || error.category() != ended.category()) return http::status::unknown;
-  const bool too_long = error == http::error::header_limit || error == http::error::buffer_overflow;
-  return too_long ? http::status::request_header_fields_too_large : http::status::bad_request;
-}
-
-/// One client. It lives as long as it waits for something.
-class Connection : public std::enable_shared_from_this<Connection> {
- public:
-  Connection(tcp::socket socket, int port, const LoopbackServer::Answer& answer)
-      : stream_(std::move(socket)), port_(port), answer_(answer) {}
-
-  void read() {
-    parser_.header_limit(kMaxHeader);
-    // verdict() applies the limit: a client without permission is refused first.
-    parser_.body_limit(std::numeric_limits<std::uint64_t>::max());
-    stream_.expires_after(kHeaderTime);
-    http::async_read_header(
-        stream_, buffer_, parser_,
-        [self = shared_from_this()](error_code error, std::size_t) { self->decide(error); });
-  }
-  [[nodiscard]] bool idle() const { return idle_; }
-  void close() { stream_.close(); }
-
- private:
-  void decide(error_code error) {
-    http::status status = error
-                              ? verdict(error)
-                              : verdict(parser_.get(), parser_.content_length().value_or(0), port_);
-    LoopbackAnswer answer;
-    if (status == http::status::ok) {
-      const auto target = parser_.get().target();
-      const std::string_view path(target.data(), std::min(target.find('?'), target.size()));
-      answer = answer_({parser_.get().method() == http::verb::post, path});
-      if (answer.bytes == nullptr) status = http::status::not_found;
-    }
-    if (status != http::status::unknown) write(status, std::move(answer));
-  }
-
-  void write(http::status status, LoopbackAnswer answer) {
-    idle_ = false;
-    bytes_ = std::move(answer.bytes);
-    response_.result(status);
-    response_.keep_alive(false);
-    response_.set(http::field::cache_control, "no-store");
-    response_.set("Content-Security-Policy", "frame-ancestors 'none'");
-    response_.set(http::field::x_frame_options, "DENY");
-    response_.set("Cross-Origin-Resource-Policy", "same-origin");
-    response_.set("X-Content-Type-Options", "nosniff");
-    if (status == http::status::method_not_allowed) response_.set(http::field::allow, "GET, POST");
-    if (bytes_ != nullptr) {
-      response_.set(http::field::content_type, answer.type);
-      response_.body() = {bytes_->data(), bytes_->size()};
-    }
-    response_.prepare_payload();
-    stream_.expires_after(kAnswerTime);
-    http::async_write(stream_, response_,
-                      [self = shared_from_this()](error_code error, std::size_t) {
-                        if (!error) self->finish();
-                      });
-  }
-
-  /// Closing a socket with unread bytes resets the connection, and with that the client may lose
-  /// the answer: a body of the allowed size is read and dropped.
-  void finish() {
-    idle_ = true;
-    error_code ignored;
-    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-    drop();
-  }
-  void drop() {
-    stream_.async_read_some(asio::buffer(dropped_),
-                            [self = shared_from_this()](error_code error, std::size_t count) {
-                              self->dropped_count_ += count;
-                              if (!error && self->dropped_count_ <= kMaxBody) self->drop();
-                            });
-  }
-
-  boost::beast::tcp_stream stream_;
-  int port_;
-  const LoopbackServer::Answer& answer_;
-  bool idle_ = true;
-  boost::beast::flat_buffer buffer_{kMaxHeader};
-  http::request_parser<http::empty_body> parser_;
-  std::shared_ptr<const std::string> bytes_;
-  http::response<http::span_body<const char>> response_;
-  std::array<char, kMaxBody> dropped_{};
-  std::size_t dropped_count_ = 0;
-};
-
-class LoopbackServer::Listener {
- public:
-  Listener(int port, Answer answer) : answer_(std::move(answer)) {
-    acceptor_.open(tcp::v4());
-    // A port whose last connections have just been closed is free; one with a server is not.
-    acceptor_.set_option(tcp::acceptor::reuse_address(true));
-    acceptor_.bind({asio::ip::address_v4::loopback(), static_cast<std::uint16_t>(port)});
-    acceptor_.listen();
-    port_ = acceptor_.local_endpoint().port();
-    accept();
-    thread_ = std::thread([this] { run(); });
-  }
-  ~Listener() {
-    context_.stop();
-    thread_.join();
-  }
-  Listener(const Listener&) = delete;
-  Listener& operator=(const Listener&) = delete;
-  [[nodiscard]] int port() const { return port_; }
-
- private:
-  void run() {
-    while (!context_.stopped()) {
-      try {
-        context_.run();
-      } catch (const std::exception&) {
-        // Memory that one client's answer lacks ends this client's connection, not the design.
-      }
-    }
-  }
-
-  void accept() {
-    acceptor_.async_accept([this](error_code error, tcp::socket socket) {
-      if (error) return accept_later();
-      accept();
-      admit(std::move(socket));
-    });
-  }
-  void accept_later() {
-    pause_.expires_after(kAcceptPause);
-    pause_.async_wait([this](error_code) { accept(); });
-  }
-
-  void admit(tcp::socket socket) {
-    std::erase_if(connections_, [](const auto& connection) { return connection.expired(); });
-    if (connections_.size() >= kMaxConnections) close_oldest();
-    const auto connection = std::make_shared<Connection>(std::move(socket), port_, answer_);
-    connections_.push_back(connection);
-    connection->read();
-  }
-  void close_oldest() {
-    const auto idle =
-        std::find_if(connections_.begin(), connections_.end(),
-                     [](const auto& connection) { return connection.lock()->idle(); });
-    const auto oldest = idle != connections_.end() ? idle : connections_.begin();
-    oldest->lock()->close();
-    connections_.erase(oldest);
-  }
-
-  Answer answer_;
-  asio::io_context context_{1};
-  tcp::acceptor acceptor_{context_};
-  asio::steady_timer pause_{context_};
-  std::vector<std::weak_ptr<Connection>> connections_;  ///< In the order of their arrival.
-  int port_ = 0;
-  std::thread thread_;
-};
-
-LoopbackServer::LoopbackServer(int port, Answer answer) try
-    : listener_(std::make_unique<Listener>(port, std::move(answer))) {
-} catch (const boost::system::system_error&) {
-  throw InputError("--live " + std::to_string(port) +
-                   ": the port is in use or not allowed; --live 0 takes a free one");
-}
-
-LoopbackServer::~LoopbackServer() = default;
-
-int LoopbackServer::port() const { return listener_->port(); }
 
 std::string live_page(const std::string& name) {
   PageContent content;
@@ -316,9 +53,10 @@ class LiveServer::Content {
       : page_(std::make_shared<const std::string>(std::move(page))),
         target_(std::make_shared<const std::string>(std::move(target))),
         stop_(std::move(stop)),
-        server_(port, [this](const LoopbackRequest& request) { return answer(request); }) {}
+        server_({port, "--live"},
+                [this](const LoopbackRequest& request) { return answer(request); }) {}
 
-  [[nodiscard]] int port() const { return server_.port(); }
+  [[nodiscard]] std::string address() const { return server_.address(); }
   void publish(LiveState state) {
     const std::lock_guard lock(mutex_);
     state_ = std::make_shared<const LiveState>(std::move(state));
@@ -360,9 +98,7 @@ LiveServer::LiveServer(int port, const std::string& name, std::string target,
 
 LiveServer::~LiveServer() = default;
 
-std::string LiveServer::address() const {
-  return joined({"http://127.0.0.1:", std::to_string(content_->port()), "/"});
-}
+std::string LiveServer::address() const { return content_->address(); }
 
 void LiveServer::publish(LiveState state) { content_->publish(std::move(state)); }
 

@@ -101,12 +101,6 @@ double width_within(const ProposalWish& wish, const Eigen::Vector2i& picture) {
   return width;
 }
 
-std::vector<PictureBlur> blurs_of(const ProposalWish& wish, const OpticalSetup& setup) {
-  const Passes passes = passes_on_lens(wish.cut, unknown_ground(wish.cut, setup));
-  const double wavelength = middle_wavelength(setup, kMmPerNm * wish.design.light.wavelength_nm);
-  return part_blurs(setup, wish.cut, passes, wish.design.thickness, wavelength);
-}
-
 /// The same wish with widths and pixels chosen where they are not stated.
 ProposalWish completed(ProposalWish wish, const Eigen::Vector2i& picture) {
   if (!wish.sized) wish.design.width = width_within(wish, picture);
@@ -311,6 +305,12 @@ Proposal proposal_of(const Image& picture, const Variant& variant, const Executo
 }  // namespace
 
 double ProposalForecast::minutes() const { return total(operations); }
+
+std::vector<PictureBlur> blurs_of(const ProposalWish& wish, const OpticalSetup& setup) {
+  const Passes passes = passes_on_lens(wish.cut, unknown_ground(wish.cut, setup));
+  const double wavelength = middle_wavelength(setup, kMmPerNm * wish.design.light.wavelength_nm);
+  return part_blurs(setup, wish.cut, passes, wish.design.thickness, wavelength);
+}
 
 int sharp_pixels(const ProposalWish& wish, const Eigen::Vector2i& picture) {
   DesignOptions design = wish.design;

@@ -59,6 +59,9 @@ struct Proposal {
 /// widest blur. @param picture  size of the picture, pixels.
 int sharp_pixels(const ProposalWish& wish, const Eigen::Vector2i& picture);
 
+/// part_blurs() of a wish. @param setup  of its design.
+std::vector<PictureBlur> blurs_of(const ProposalWish& wish, const OpticalSetup& setup);
+
 /// Durations of a cut's operations: length of their passes over feed, and kOperationMinutes.
 /// @param size  of the lens, mm. @param relief, mean  highest and mean height of the surface above
 ///                 its lowest point, mm.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <thread>
 
 namespace lensforge {
 namespace {
@@ -62,7 +63,20 @@ std::string SimulatedMachine::read(std::int64_t opened, double wait) {
   require_open(opened);
   if (first_arrival() <= now() && wire_.gathering > 0.0) run_until(now() + wire_.gathering);
   require_open(opened);
+  keep_pace();
   return take_arrived();
+}
+
+void SimulatedMachine::wait(double seconds) {
+  run_until(now() + seconds);
+  keep_pace();
+}
+
+void SimulatedMachine::keep_pace() const {
+  if (wire_.pace <= 0.0) return;
+  const std::chrono::duration<double> due(now() / wire_.pace);
+  std::this_thread::sleep_until(
+      begun_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(due));
 }
 
 /// Time passes until `deadline`, or until a byte has come to the host.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -25,6 +26,8 @@ struct WireOptions {
   double gathering = 0.001;           ///< s for which arriving bytes are collected into one read.
   std::size_t host_buffer = 4096;     ///< Maximum number of written bytes in transit.
   bool reset_on_open = false;         ///< Opening the port restarts the board, as many do.
+  /// Simulated seconds per second; 0: as fast as the machine computes.
+  double pace = 0.0;
 };
 
 /// A simulated controller with its connection and clock. Time passes only during waits and
@@ -35,7 +38,7 @@ class SimulatedMachine : public Clock {
                             const MachineWatch& watch = {});
 
   [[nodiscard]] double now() const override { return controller_.now(); }
-  void wait(double seconds) override { run_until(now() + seconds); }
+  void wait(double seconds) override;
 
   /// Opens the port and closes any earlier link. @throw LinkLost while it is unplugged.
   std::unique_ptr<Link> open();
@@ -90,6 +93,8 @@ class SimulatedMachine : public Clock {
   std::size_t write(std::int64_t opened, std::string_view bytes);
   void require_open(std::int64_t opened) const;
   void run_until(double time);
+  /// Sleeps until the time has come to which the simulation has run, at WireOptions::pace.
+  void keep_pace() const;
   void run_to_first_byte(double deadline);
   void run_to_next_event(double time);
   void deliver();
@@ -101,6 +106,7 @@ class SimulatedMachine : public Clock {
 
   WireOptions wire_;
   SimulatedController controller_;
+  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   std::int64_t opened_ = 0;  ///< Number of the open link; 0 for none.
   std::int64_t opens_ = 0;
   std::string outgoing_;

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/studio/studio_job.h"
+
+namespace lensforge::app {
+
+/// There is no such project, file or request.
+struct NotFound {
+  std::string what;
+};
+
+/// A picture on its way to a part: a folder with the picture, lens folders `lens-1`, `lens-2`, …,
+/// workshop.toml, and what the studio keeps of it in studio.json and `.studio`. Every step is a
+/// command in that folder. Not for several threads.
+class Project {
+ public:
+  /// Opens a folder that create() made. @throw InputError if its studio.json cannot be read.
+  Project(std::filesystem::path folder, ComputeTurn& turn);
+
+  /// Makes a project from the bytes of a picture. @param title  for its folder's name.
+  /// @return the folder. @throw InputError if no picture can be read from them.
+  static std::filesystem::path create(const std::filesystem::path& parent, const std::string& title,
+                                      std::string_view bytes);
+  static bool is_project(const std::filesystem::path& folder);
+
+  /// Everything that the page shows of it. @param address  of its files: "/projects/rose/".
+  [[nodiscard]] nlohmann::json state(const std::string& address) const;
+  /// "name", "picture", "words", "running".
+  [[nodiscard]] nlohmann::json summary(const std::string& address) const;
+
+  /// Takes a PNG as the picture; the original if it is empty.
+  void take_picture(std::string_view bytes);
+  /// {"settings": {…}, "workshop": {…}}; null removes a value. @throw InputError naming option or
+  /// key, value and rule; then nothing is changed.
+  void take_settings(const nlohmann::json& changes);
+  /// {"step": "plan" | "design" | "cam" | "view" | "export", "format": …}
+  void run(const nlohmann::json& request);
+  /// {"program": "finish.ngc", "port": "sim:grbl@1x", "how": "restart" | "resume"}
+  void send(const nlohmann::json& request);
+  void press(const nlohmann::json& request);
+  void pause();
+  void resume();
+  void undo() { step_version(-1); }
+  void redo() { step_version(1); }
+
+  /// A file of the project. @param path  relative. @throw NotFound unless it is a regular file in
+  /// the folder, not hidden.
+  [[nodiscard]] std::filesystem::path file(std::string_view path) const;
+  /// A picture of the lens's relief; made when it is first asked for. @throw NotFound
+  [[nodiscard]] std::filesystem::path relief() const;
+  [[nodiscard]] std::string live_picture(bool error) const;
+
+ private:
+  void save() const;
+  void start(StudioTask task);
+  void require_idle() const;
+  void require_picture() const;
+  void step_version(int by);
+  [[nodiscard]] std::string lens_name() const;
+  [[nodiscard]] std::filesystem::path lens_folder() const { return folder_ / lens_name(); }
+  [[nodiscard]] std::vector<int> versions() const;
+  [[nodiscard]] int next_version() const;
+  [[nodiscard]] bool computing() const { return job_ && job_->running(); }
+  [[nodiscard]] bool sending() const { return cut_ && cut_->running(); }
+
+  [[nodiscard]] bool can_vary() const;
+  [[nodiscard]] Arguments words_of(const std::string& step, const std::string& format) const;
+  [[nodiscard]] Arguments setting_words(bool of_plan) const;
+  [[nodiscard]] Arguments send_words(const nlohmann::json& request) const;
+
+  [[nodiscard]] nlohmann::json picture_json(const std::string& address) const;
+  [[nodiscard]] nlohmann::json light_json() const;
+  [[nodiscard]] nlohmann::json commands_json() const;
+  [[nodiscard]] nlohmann::json plan_json() const;
+  [[nodiscard]] nlohmann::json lens_json(const std::string& address) const;
+  [[nodiscard]] nlohmann::json part_json(const std::string& address) const;
+  [[nodiscard]] nlohmann::json job_json(const std::string& address) const;
+  [[nodiscard]] nlohmann::json tool_json(const nlohmann::json& position,
+                                         const std::filesystem::path& program) const;
+  [[nodiscard]] nlohmann::json cut_json(const std::string& address) const;
+  [[nodiscard]] std::string standing() const;
+
+  std::filesystem::path folder_;
+  ComputeTurn* turn_;
+  nlohmann::json record_;  ///< studio.json
+  std::unique_ptr<StudioJob> job_;
+  std::unique_ptr<StudioJob> cut_;
+};
+
+}  // namespace lensforge::app

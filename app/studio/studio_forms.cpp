@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "app/studio/studio_forms.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "app/batch/batch_job.h"
+#include "app/commands/design_command.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "core/error.h"
+#include "core/image/image.h"
+#include "core/optics/material.h"
+#include "core/optics/picture_blur.h"
+#include "core/schema/json.h"
+#include "core/schema/option_text.h"
+#include "core/text/words.h"
+#include "design/schedule/levels.h"
+
+namespace lensforge::app {
+namespace {
+
+using nlohmann::json;
+
+/// Options of the form, the usual ones first. Those that name files are not among them: a page
+/// reaches nothing but its project.
+constexpr std::array kFormOptions{
+    "--lamp",        "--material", "--width",   "--focal",   "--image-width", "--pixels",
+    "--thickness",   "--outline",  "--quality", "--model",   "--light-model", "--image-offset",
+    "--screen-tilt", "--view",     "--mode",    "--fresnel", "--background"};
+
+const char* kind_word(FieldKind kind) {
+  switch (kind) {
+    case FieldKind::kFlag:
+      return "flag";
+    case FieldKind::kWhole:
+      return "whole";
+    case FieldKind::kNumber:
+      return "number";
+    case FieldKind::kLength:
+      return "length";
+    case FieldKind::kWord:
+      return "word";
+    default:
+      return "text";
+  }
+}
+
+json or_null(double bound) { return std::isfinite(bound) ? json(bound) : json(); }
+
+json field_json(const Field& field, const std::string& name) {
+  return {{"name", name},
+          {"kind", kind_word(field.kind)},
+          {"help", field.help},
+          {"unit", field.kind == FieldKind::kLength ? "mm"
+                   : field.is_number()              ? field.unit
+                                                    : ""},
+          {"rule", field.is_number() ? field.limits.rule() : ""},
+          {"low", or_null(field.limits.low)},
+          {"high", or_null(field.limits.high)},
+          {"words", field.words},
+          {"suggestions", json::array()},
+          {"value", json_of(field.get())}};
+}
+
+json light_fields() {
+  const Description all = description_of(DesignSettings());
+  json fields = json::array();
+  for (const char* name : kFormOptions) {
+    json field = field_json(all.at(name), name);
+    if (field["name"] == "--lamp") {
+      field["suggestions"] = {"sun",   "led:3mm@600mm", "led:5mm@1m",
+                              "torch", "laser:532nm",   "projector"};
+    }
+    if (field["name"] == "--material") field["suggestions"] = material_names();
+    if (field["name"] == "--outline") field["suggestions"] = {"rectangle", "circle", "rounded:5"};
+    fields.push_back(std::move(field));
+  }
+  json made = field_json(all.at("--made-by"), "--made-by");
+  made["kind"] = "flag";
+  made["value"] = false;
+  fields.push_back(std::move(made));
+  return fields;
+}
+
+/// Calls `visit` with every single field of a description and its path.
+template <class Visit>
+void walk(const Description& description, const std::string& prefix, const Visit& visit) {
+  for (const Field& field : description) {
+    const std::string path = prefix + field.name;
+    if (field.kind == FieldKind::kTable) {
+      walk(field.parts().front(), path + ".", visit);
+    } else if (field.kind == FieldKind::kList) {
+      const std::vector<Description> items = field.parts();
+      for (std::size_t i = 0; i < items.size(); ++i) {
+        walk(items[i], path + "." + std::to_string(i + 1) + ".", visit);
+      }
+    } else if (field.kind != FieldKind::kNumbers) {
+      visit(field, path);
+    }
+  }
+}
+
+/// "finish" of "finish.pitch", "tool 2" of "tool.2.diameter".
+std::string section_of(const std::string& path) {
+  std::string section = path.substr(0, path.rfind('.'));
+  std::replace(section.begin(), section.end(), '.', ' ');
+  return section == path ? "workshop" : section;
+}
+
+json workshop_sections() {
+  json sections = json::array();
+  walk(description_of(Workshop()), "", [&](const Field& field, const std::string& path) {
+    const std::string name = section_of(path);
+    const auto found = std::find_if(sections.begin(), sections.end(),
+                                    [&](const json& one) { return one["name"] == name; });
+    json& section =
+        found != sections.end()
+            ? *found
+            : sections.emplace_back(json{{"name", name}, {"help", ""}, {"fields", json::array()}});
+    section["fields"].push_back(field_json(field, path));
+  });
+  return sections;
+}
+
+/// A value as typed.
+std::string text_of(const json& value) {
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+/// @throw InputError where a text could name a file outside of the project.
+void refuse_paths(const std::string& name, const json& value) {
+  if (!value.is_string()) return;
+  const auto text = value.get<std::string>();
+  if (text.find('/') == std::string::npos && !text.starts_with('.') && !text.starts_with('-')) {
+    return;
+  }
+  throw InputError(name + " " + printable_line(text) +
+                   ": a page cannot name files outside of its project; the command can");
+}
+
+/// @throw InputError that begins with the option's name.
+void set(BatchStep& step, const std::string& name, const json& value) {
+  try {
+    step.set(name.substr(2), value);
+  } catch (const InputError& e) {
+    const std::string words = e.what();
+    const std::string before = step.command + " ";
+    throw InputError(words.starts_with(before) ? words.substr(before.size()) : words);
+  }
+}
+
+json widths_json(const OpticalSetup& setup) {
+  const std::optional<Eigen::Vector3d> lamp = lamp_place(setup.lamp);
+  const double width = setup.extent.width;
+  const bool none = setup.extent.none();
+  return {{"lamp_mm", lamp ? json(std::abs(lamp->z())) : json()},
+          {"lamp_width_mm", lamp && !none ? json(width) : json()},
+          {"lamp_angle_rad", !lamp && !none ? json(width) : json()}};
+}
+
+}  // namespace
+
+json studio_forms() { return {{"light", light_fields()}, {"workshop", workshop_sections()}}; }
+
+bool is_form_option(const std::string& name) {
+  return name == "--made-by" ||
+         std::find(kFormOptions.begin(), kFormOptions.end(), name) != kFormOptions.end();
+}
+
+bool is_plan_option(const std::string& name) {
+  static const Description known = plan_call().options;
+  return std::any_of(known.begin(), known.end(),
+                     [&](const Field& field) { return field.name == name; });
+}
+
+json changed_settings(json settings, const json& changes) {
+  if (!changes.is_object()) throw InputError("settings: must be an object of options and values");
+  BatchStep step{"design", json::object()};
+  for (const auto& [name, value] : changes.items()) {
+    if (!is_form_option(name)) throw InputError("option " + name + ": the page does not set it");
+    if (value.is_null()) {
+      settings.erase(name);
+      continue;
+    }
+    refuse_paths(name, value);
+    if (name == "--made-by") {
+      if (!value.is_boolean()) throw InputError("--made-by: must be true or false");
+    } else {
+      set(step, name, value);
+    }
+    settings[name] = value;
+  }
+  return settings;
+}
+
+Workshop workshop_with(const json& values) {
+  Workshop workshop;
+  for (const auto& [name, value] : values.items()) {
+    bool found = false;
+    walk(description_of(workshop), "", [&](const Field& field, const std::string& path) {
+      if (path != name) return;
+      found = true;
+      FieldSpec spec = field;
+      spec.name = path;
+      field.set(value_of(spec, text_of(value)));
+    });
+    if (!found) throw InputError(name + ": a workshop has no such key");
+  }
+  validate(workshop, "workshop");
+  return workshop;
+}
+
+json changed_workshop(json values, const json& changes) {
+  if (!changes.is_object()) throw InputError("workshop: must be an object of keys and values");
+  for (const auto& [name, value] : changes.items()) {
+    if (value.is_null()) {
+      values.erase(name);
+    } else {
+      refuse_paths(name, value);
+      values[name] = value;
+    }
+  }
+  workshop_with(values);
+  return values;
+}
+
+json wish_json(const ProposalWish& wish, const Eigen::Vector2i& picture) {
+  const DesignOptions& design = wish.design;
+  const Eigen::Vector2i pixels = working_size(picture.x(), picture.y(), design.pixels);
+  validate(design, Image(pixels.x(), pixels.y(), 1.0F));
+  const OpticalSetup setup = optical_setup(design, pixels);
+  const std::vector<PictureBlur> blurs = blurs_of(wish, setup);
+  json wanted{{"lens_mm", {setup.lens_size.x(), setup.lens_size.y()}},
+              {"picture_mm", {setup.image_size.x(), setup.image_size.y()}},
+              {"focal_mm", design.focal_length},
+              {"thickness_mm", design.thickness},
+              {"mirror", traits(setup.body).lit_from_above},
+              {"pixels", {pixels.x(), pixels.y()}},
+              {"blurs", blurs_json(blurs)},
+              {"sharp_pixels", sharp_pixels(wish, picture)},
+              {"words", blur_words(blurs)}};
+  wanted.update(widths_json(setup));
+  return wanted;
+}
+
+}  // namespace lensforge::app
