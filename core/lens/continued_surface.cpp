@@ -28,6 +28,11 @@ constexpr double kSteepest = 1.0;
 /// Step of differences along the rim, mm: their errors are below 1e-6 of a slope.
 constexpr double kStep = 1e-3;
 
+/// Largest slope and curvature that go on, in means of their sizes over the rim: a rim's own stay
+/// below, while those where a spline's knots crowd (3 µm apart at the corner of a picture of 24
+/// pixels) and their derivatives at a corner would lift the continuation by 150 mm.
+constexpr double kMostOfMean = 30.0;
+
 constexpr int kSides = 4;
 constexpr std::int64_t kFewestLayers = 2;
 constexpr std::int64_t kMostLayers = 16;
@@ -133,7 +138,23 @@ class Rim {
 class Continuation {
  public:
   Continuation(const OpticalSurface& surface, const RunOut& run_out)
-      : rim_(surface), run_out_(run_out) {}
+      : rim_(surface), run_out_(run_out) {
+    double steep = 0.0;
+    double bent = 0.0;
+    double length = 0.0;
+    for (int side = 0; side < kSides; ++side) {
+      for (const RimEdge& edge : rim_.edges(side)) {
+        const RimPoint middle = rim_.point(side, 0.5 * (edge.from + edge.to));
+        const double along = edge.to - edge.from;
+        steep += along * middle.shape.slope.norm();
+        bent += along * std::abs(bend_at(side, middle));
+        length += along;
+      }
+    }
+    steepest_ = std::min(kSteepest, kMostOfMean * steep / length);
+    // What a curvature adds to the slope in the end is bounded like the slope.
+    most_bent_ = std::min(steepest_ / run_out_.slope(run_out_.length), kMostOfMean * bent / length);
+  }
 
   [[nodiscard]] const Rim& rim() const { return rim_; }
 
@@ -166,10 +187,13 @@ class Continuation {
       return (2.0 * a - 5.0 * b + 4.0 * c - d) / (kStep * kStep);
     };
     const auto& [a, b, c, d] = strips;
-    const double slope = std::clamp(first(a.z, b.z, c.z, d.z), -kSteepest, kSteepest);
-    const double bend = a.curved ? second(a.z, b.z, c.z, d.z) : 0.0;
-    const double out_slope = first(a.out, b.out, c.out, d.out);
-    const double out_bend = a.curved ? second(a.out, b.out, c.out, d.out) : 0.0;
+    const double slope = std::clamp(first(a.z, b.z, c.z, d.z), -steepest_, steepest_);
+    const double bend =
+        a.curved ? std::clamp(second(a.z, b.z, c.z, d.z), -most_bent_, most_bent_) : 0.0;
+    const bool rising = std::abs(slope) < steepest_;
+    const double out_slope = rising ? first(a.out, b.out, c.out, d.out) : 0.0;
+    const bool bent = std::abs(bend) < most_bent_;
+    const double out_bend = a.curved && bent ? second(a.out, b.out, c.out, d.out) : 0.0;
     const double height = run_out_.height(distance);
     return {a.z + distance * slope + height * bend,
             (slope + run_out_.slope(distance) * bend) * axes.along +
@@ -187,12 +211,17 @@ class Continuation {
     bool curved = false;  ///< The rim's curvature is continued.
   };
 
+  static double bend_at(int side, const RimPoint& rim) {
+    const Eigen::Vector2d out = side_of(side).out;
+    return out.dot(rim.shape.bend * out);
+  }
+
   [[nodiscard]] Strip strip(int side, double at, double level) const {
     const Side axes = side_of(side);
     const RimPoint rim = rim_.point(side, at);
     const double distance = std::max(level - axes.out.dot(rim.place), 0.0);
-    const double slope = std::clamp(rim.shape.slope.dot(axes.out), -kSteepest, kSteepest);
-    const double bend = axes.out.dot(rim.shape.bend * axes.out);
+    const double slope = std::clamp(rim.shape.slope.dot(axes.out), -steepest_, steepest_);
+    const double bend = std::clamp(bend_at(side, rim), -most_bent_, most_bent_);
     Strip strip;
     strip.level = level;
     strip.added = distance * slope + run_out_.height(distance) * bend;
@@ -205,6 +234,8 @@ class Continuation {
 
   Rim rim_;
   RunOut run_out_;
+  double steepest_ = kSteepest;  ///< Rise over run.
+  double most_bent_ = 0.0;       ///< 1/mm
 };
 
 /// A triangle of the continuation: beyond this side, or beyond it and the next one.

@@ -10,9 +10,11 @@
 #include <cstdint>
 #include <mutex>
 #include <numbers>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "core/error.h"
 #include "core/optics/light_path.h"
 #include "design/waves/wave_tile.h"
 
@@ -197,6 +199,7 @@ void for_each_cell(const FieldPlan& plan, const LaidTriangle& triangle, const Ta
 }  // namespace
 
 int transform_size(double least) {
+  LF_CHECK(least < kMostTransform, "a field of " + std::to_string(least) + " nodes");
   for (int size = 2 * static_cast<int>(std::ceil(0.5 * std::max(least, 8.0)));; size += 2) {
     int rest = size;
     for (const int factor : {2, 3, 5, 7}) {

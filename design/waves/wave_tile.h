@@ -63,7 +63,9 @@ struct FieldPlan {
 };
 
 /// The next size of 2, 3, 5 and 7 from `least` up, even: fast to transform.
+/// @pre least is below kMostTransform: tiles need some thousands, so more is a surface with a hole.
 int transform_size(double least);
+inline constexpr double kMostTransform = 1e7;
 
 /// How a plane lies on a picture.
 struct OnPicture {

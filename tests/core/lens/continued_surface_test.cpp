@@ -111,6 +111,36 @@ TEST(ContinuedSurface, BeyondASplineIsItsSeriesWithACurvatureThatRunsOut) {
   }
 }
 
+/// Knots a few micrometres apart at a corner, as optimal transport leaves them, and heights that
+/// are rough at their scale: derivatives of fourth order reach 1e7/mm³ there.
+TEST(ContinuedSurface, StaysTameWhereKnotsCrowdAtACorner) {
+  ControlNet net = sample_spline();
+  const auto crowd = [&](int i, int j) -> Eigen::Ref<Eigen::Vector3d> {
+    return net.points.col(j * net.shape.columns + i);
+  };
+  for (int k = 1; k <= 3; ++k) {
+    for (int j = 0; j < net.shape.rows; ++j) {
+      crowd(k, j).x() = 0.003 * k;
+      crowd(k, j).z() = crowd(0, j).z();
+    }
+    for (int i = 0; i < net.shape.columns; ++i) {
+      crowd(i, k).y() = 0.003 * k;
+      crowd(i, k).z() = crowd(i, 0).z();
+    }
+  }
+  for (int j = 0; j <= 3; ++j) {
+    for (int i = 0; i <= 3; ++i) crowd(i, j).z() += (i * 7 + j * 5) % 3 == 0 ? 1e-4 : -1e-4;
+  }
+  const auto surface = std::make_shared<const SplineSurface>(net);
+  const auto whole = continued_surface(surface, kReach, kRunOut);
+  const auto& inside = surface->mesh().vertices.row(2);
+  const auto& heights = whole->mesh().vertices.row(2);
+  EXPECT_TRUE(heights.allFinite());
+  // Slope and curvature beyond one side and beyond the next add a slope of at most 1 each.
+  EXPECT_LT(heights.maxCoeff(), inside.maxCoeff() + 4.0 * kReach);
+  EXPECT_GT(heights.minCoeff(), inside.minCoeff() - 4.0 * kReach);
+}
+
 TEST(ContinuedSurface, SlopesAreThoseOfTheHeightsAndContinuous) {
   const auto whole = continued_surface(spline(), kReach, kRunOut);
   const Eigen::Vector2d size = size_of(whole->mesh());
