@@ -158,7 +158,8 @@ std::string mae_words(double mae) { return "MAE " + decimal_text(mae, 4); }
 }  // namespace
 
 bool Project::is_project(const fs::path& folder) {
-  return json_in(folder / kRecord).value("format", "") == kFormat;
+  const json record = json_in(folder / kRecord);
+  return record.is_object() && record.value("format", "") == kFormat;
 }
 
 fs::path Project::create(const fs::path& parent, const std::string& title, std::string_view bytes) {
@@ -600,20 +601,23 @@ json Project::part_json(const std::string& address) const {
   const bool current =
       !fs::exists(workshop) || fs::last_write_time(workshop) <= fs::last_write_time(file);
   const json verdict = report.value("verdict", json::object());
-  json missed = json::array();
+  std::string missed;
   for (const json& check : verdict.value("checks", json::array())) {
-    if (!check.value("pass", true)) missed.push_back(check.value("words", ""));
+    const bool counts = !check.value("pass", true) && !check.value("advice", false);
+    if (counts) missed = with_word(std::move(missed), check.value("words", ""));
   }
   const json& last = by["surfaces"].back();
   return {{"mae", last.value("mae", 0.0)},
           {"model", waves ? "waves" : "rays"},
           {"range", range},
+          {"range_words",
+           "No range: how much parts differ is forecast for a lamp without width, "
+           "a rectangle and one ball."},
           {"leakage", by["leakage"].value("share", 0.0)},
           {"contrast", by["leakage"].value("contrast", json())},
           {"minutes", report.value("minutes", 0.0)},
           {"operations", operations},
-          {"verdict", verdict.value("pass", false) ? "all limits are kept"
-                                                   : "limits are missed: " + missed.dump()},
+          {"verdict", missed.empty() ? "All limits are kept." : "Limits missed: " + missed + "."},
           {"pass", verdict.value("pass", false)},
           {"current", current},
           {"warnings", report.value("warnings", json::array())},
@@ -634,8 +638,8 @@ json Project::job_json(const std::string& address) const {
   return job;
 }
 
-/// Where the tool is over the lens, shares from its upper left corner as seen by the cutter; null if
-/// that is not known. @param position  in the machine's coordinates.
+/// Where the tool is over the lens, shares from its upper left corner as seen by the cutter; null
+/// if that is not known. @param position  in the machine's coordinates.
 json Project::tool_json(const json& position, const fs::path& program) const {
   std::ifstream stream(folder_ / kKept / kEvents);
   std::string first;

@@ -129,8 +129,10 @@ std::string studio_page() {
   content.head =
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' "
       "blob: data:; connect-src 'self'; style-src 'unsafe-inline'; script-src "
-      "'unsafe-inline'\">\n" +
+      "'unsafe-inline'\">\n"
+      "<link rel=\"icon\" href=\"data:,\">\n" +
       element("style", "", "\n" + std::string(studio_files::kStyle));
+  content.header = element("h1", "", "lensforge studio") + element("p", "data-folder", "");
   content.body = std::string(studio_files::kBody);
   content.footer = escape_html(program_mark());
   content.script = "(function () {\n\"use strict\";\n";

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "app/batch/batch_job.h"
@@ -105,11 +107,13 @@ void walk(const Description& description, const std::string& prefix, const Visit
   }
 }
 
-/// "finish" of "finish.pitch", "tool 2" of "tool.2.diameter".
+/// "finish" of "finish.pitch", "tool 2" of "tool.2.diameter" and "tool.2.section.1.length".
 std::string section_of(const std::string& path) {
-  std::string section = path.substr(0, path.rfind('.'));
-  std::replace(section.begin(), section.end(), '.', ' ');
-  return section == path ? "workshop" : section;
+  const std::vector<std::string_view> parts = split(path, '.');
+  std::string section(parts.front());
+  const bool item = parts.size() > 2 && parts[1].find_first_not_of("0123456789") == parts[1].npos;
+  if (item) section.append(" ").append(parts[1]);
+  return section;
 }
 
 json workshop_sections() {
@@ -143,15 +147,43 @@ void refuse_paths(const std::string& name, const json& value) {
                    ": a page cannot name files outside of its project; the command can");
 }
 
-/// @throw InputError that begins with the option's name.
-void set(BatchStep& step, const std::string& name, const json& value) {
+/// A value as JSON; whole numbers without a fraction, as one types them.
+json plain(const FieldValue& value) {
+  constexpr double kExact = 1e15;
+  const double* const number = std::get_if<double>(&value);
+  const bool whole =
+      number != nullptr && *number == std::trunc(*number) && std::abs(*number) < kExact;
+  return whole ? json(static_cast<std::int64_t>(*number)) : json_of(value);
+}
+
+/// The value that an option of a design gets: a length in mm. @throw InputError that begins with
+/// the option's name.
+json design_value(const std::string& name, const json& value) {
+  static const Description known = description_of(DesignSettings());
+  BatchStep step{"design", json::object()};
   try {
     step.set(name.substr(2), value);
+    return value.is_boolean() ? value : plain(value_of(known.at(name), text_of(value)));
   } catch (const InputError& e) {
     const std::string words = e.what();
     const std::string before = step.command + " ";
     throw InputError(words.starts_with(before) ? words.substr(before.size()) : words);
   }
+}
+
+/// Sets a key of a workshop. @return its value, a length in mm. @throw InputError naming key, value
+/// and rule.
+json set_key(Workshop& workshop, const std::string& name, const json& value) {
+  json taken;
+  walk(description_of(workshop), "", [&](const Field& field, const std::string& path) {
+    if (path != name) return;
+    FieldSpec spec = field;
+    spec.name = path;
+    field.set(value_of(spec, text_of(value)));
+    taken = plain(field.get());
+  });
+  if (taken.is_null()) throw InputError(name + ": a workshop has no such key");
+  return taken;
 }
 
 json widths_json(const OpticalSetup& setup) {
@@ -180,18 +212,18 @@ bool is_plan_option(const std::string& name) {
 
 json changed_settings(json settings, const json& changes) {
   if (!changes.is_object()) throw InputError("settings: must be an object of options and values");
-  BatchStep step{"design", json::object()};
   for (const auto& [name, value] : changes.items()) {
     if (!is_form_option(name)) throw InputError("option " + name + ": the page does not set it");
     if (value.is_null()) {
       settings.erase(name);
       continue;
     }
-    refuse_paths(name, value);
     if (name == "--made-by") {
       if (!value.is_boolean()) throw InputError("--made-by: must be true or false");
     } else {
-      set(step, name, value);
+      settings[name] = design_value(name, value);
+      refuse_paths(name, settings[name]);
+      continue;
     }
     settings[name] = value;
   }
@@ -200,17 +232,7 @@ json changed_settings(json settings, const json& changes) {
 
 Workshop workshop_with(const json& values) {
   Workshop workshop;
-  for (const auto& [name, value] : values.items()) {
-    bool found = false;
-    walk(description_of(workshop), "", [&](const Field& field, const std::string& path) {
-      if (path != name) return;
-      found = true;
-      FieldSpec spec = field;
-      spec.name = path;
-      field.set(value_of(spec, text_of(value)));
-    });
-    if (!found) throw InputError(name + ": a workshop has no such key");
-  }
+  for (const auto& [name, value] : values.items()) set_key(workshop, name, value);
   validate(workshop, "workshop");
   return workshop;
 }
@@ -220,10 +242,11 @@ json changed_workshop(json values, const json& changes) {
   for (const auto& [name, value] : changes.items()) {
     if (value.is_null()) {
       values.erase(name);
-    } else {
-      refuse_paths(name, value);
-      values[name] = value;
+      continue;
     }
+    Workshop scratch;
+    values[name] = set_key(scratch, name, value);
+    refuse_paths(name, values[name]);
   }
   workshop_with(values);
   return values;

@@ -35,7 +35,9 @@ function fieldInput(field, id) {
 }
 
 function hintOf(field, plainHint) {
-  const hint = plainHint || field.help, capital = hint && hint[0].toUpperCase() + hint.slice(1).replace(/\.$/, "");
+  const own = plainHint || field.help || "";
+  // The unit stands in the field.
+  const hint = field.unit && own.startsWith(field.unit) ? own.slice(field.unit.length).replace(/^[\s,;:]+/, "") : own, capital = hint && hint[0].toUpperCase() + hint.slice(1).replace(/\.$/, "");
   return [capital, field.rule].filter(Boolean).join("; ").replace(/[^.]$/, "$&.");
 }
 
@@ -49,6 +51,8 @@ function makeField(field, form, plain, section) {
   const list = input.getAttribute("list") ? make("datalist", { id: input.getAttribute("list") }, ...field.suggestions.map((value) => make("option", { value }))) : null;
   input.setAttribute("aria-describedby", `${hint.id} ${error.id}`);
   input.addEventListener(input.tagName === "INPUT" && input.type === "text" ? "input" : "change", () => fieldTyped(field.name));
+  // A value as the server has it, once one has left the field: "1.2 cm" is 12.
+  input.addEventListener("blur", () => { if (page.state) showFields(page.state); });
   const label = make("label", { for: id, text: words });
   const flag = field.kind === "flag";
   const box = make("span", { class: "box" }, input, field.unit && !flag ? make("span", { class: "unit", text: field.unit }) : null);
@@ -125,7 +129,9 @@ async function sendFields() {
   try {
     const state = await post(projectPath("settings"), sent);
     for (const name of names) settle(name);
-    if (project === page.project) take(state);
+    if (project !== page.project) return;
+    take(state);
+    showFields(state);
   } catch (e) {
     if (project === page.project) await refused(e, sent, step);
   }

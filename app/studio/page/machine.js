@@ -78,8 +78,10 @@ function makeMachine() {
 function showTool(cut) {
   const at = cut.tool, mark = find("tool");
   setPicture(find("under"), cut.under);
-  setHidden(mark, !at);
-  if (!at) return;
+  // Away from the lens, at the machine's own zero, say, there is nothing to see.
+  const near = at && at.every((v) => v > -0.2 && v < 1.2);
+  setHidden(mark, !near);
+  if (!near) return;
   mark.style.left = `${100 * at[0]}%`;
   mark.style.top = `${100 * at[1]}%`;
   machine.trail.push(at.map((v) => v.toFixed(4)).join(","));

@@ -115,7 +115,7 @@ function rangeDrawing(mae, range) {
 function partFigures(part) {
   const one = (name, value, ...more) => make("div", {}, soft(name), make("b", { text: value }), ...more);
   const { mae, range } = part;
-  const spread = range ? [rangeDrawing(mae, range), soft(`P10–P90 ${number(range.p10, 3)}–${number(range.p90, 3)}: four of five parts`)] : [soft("range unknown")];
+  const spread = range ? [rangeDrawing(mae, range), soft(`P10–P90 ${number(range.p10, 3)}–${number(range.p90, 3)}${part.model === "waves" ? " by rays" : ""}: four of five parts`)] : [soft(part.range_words)];
   return [
     one("MAE from the picture", number(mae, 3), ...spread),
     one("Leakage", percent(part.leakage), soft("light in what should be dark")),

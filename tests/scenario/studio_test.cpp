@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `lensforge studio` from outside: who is answered, what a picture goes through, what a killed
+// studio keeps.
+#include <httplib.h>
+
+#include <csignal>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "core/temp_folder.h"
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using nlohmann::json;
+using std::chrono::milliseconds;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A running studio and a browser that has opened its address.
+class Browser {
+ public:
+  explicit Browser(const std::string& folder, const std::string& port = "0")
+      : studio_(Arguments{"studio", folder, "--port", port}) {
+    const std::string before = "http://127.0.0.1:";
+    for (int i = 0; i < 100 && studio_.runs_for(milliseconds(100)); ++i) {
+      const std::string said = studio_.said();
+      const auto at = said.find(before);
+      const auto key = said.find("?key=");
+      if (at == std::string::npos || said.find('\n', key) == std::string::npos) continue;
+      port_ = std::stoi(said.substr(at + before.size()));
+      key_ = said.substr(key + 5, 32);
+      break;
+    }
+    client_.emplace("127.0.0.1", port_);
+    client_->set_read_timeout(30);
+    cookie_ = "lensforge-" + std::to_string(port_) + "=" + key_;
+  }
+
+  [[nodiscard]] int port() const { return port_; }
+  [[nodiscard]] const std::string& key() const { return key_; }
+  [[nodiscard]] const std::string& cookie() const { return cookie_; }
+  Process& process() { return studio_; }
+  httplib::Client& client() { return *client_; }
+
+  httplib::Result get(const std::string& path) { return client_->Get(path, {{"Cookie", cookie_}}); }
+  json state(const std::string& project) {
+    return json::parse(get("/projects/" + project + "/state.json")->body);
+  }
+  httplib::Result post(const std::string& path, const std::string& body = "") {
+    return client_->Post(path, httplib::Headers{{"Cookie", cookie_}, {"X-Lensforge", "studio"}},
+                         body, "application/octet-stream");
+  }
+  httplib::Result post(const std::string& path, const json& body) {
+    return post(path, body.dump());
+  }
+  /// A project with a picture of the fixtures as it is.
+  std::string project(const std::string& name) {
+    const auto made = post("/projects?title=" + name, testing::read_bytes(picture(name)));
+    const std::string own = json::parse(made->body)["name"];
+    post("/projects/" + own + "/picture");
+    return own;
+  }
+  /// The project's state once `there` is true of it; null after two minutes.
+  json wait(const std::string& project, const std::function<bool(const json&)>& there) {
+    for (int i = 0; i < 600; ++i) {
+      json now = state(project);
+      if (there(now)) return now;
+      std::this_thread::sleep_for(milliseconds(200));
+    }
+    return nullptr;
+  }
+  json run(const std::string& project, const json& step) {
+    post("/projects/" + project + "/run", step);
+    return wait(project, [](const json& now) {
+      const std::string status = now["job"]["status"];
+      return status != "waiting" && status != "running" && status != "stopping";
+    });
+  }
+
+ private:
+  Process studio_;
+  int port_ = 0;
+  std::string key_;
+  std::string cookie_;
+  std::optional<httplib::Client> client_;
+};
+
+std::string error_of(const httplib::Result& answer) {
+  return json::parse(answer->body).value("error", "");
+}
+
+using Studio = Scenario;
+
+/// A small lens that takes seconds.
+const json kSmall{{"settings", {{"--pixels", 24}, {"--width", 6}, {"--focal", 40}}}};
+
+TEST_F(Studio, AnswersOnlyTheBrowserThatOpenedItsAddress) {
+  Browser browser(path("studio"));
+  auto& client = browser.client();
+  EXPECT_EQ(client.Get("/")->status, 403);
+  EXPECT_EQ(client.Get("/?key=00000000000000000000000000000000")->status, 403);
+  EXPECT_EQ(client.Get("/studio.json")->status, 403);
+  const auto page = client.Get("/?key=" + browser.key());
+  EXPECT_EQ(page->status, 200);
+  EXPECT_THAT(page->get_header_value("Set-Cookie"), HasSubstr("HttpOnly; SameSite=Strict"));
+  EXPECT_EQ(browser.get("/studio.json")->status, 200);
+  // Another site's name for this port, and another site's form.
+  const httplib::Headers other{{"Host", "elsewhere.example"}, {"Cookie", browser.cookie()}};
+  EXPECT_EQ(client.Get("/studio.json", other)->status, 403);
+  const httplib::Headers form{{"Cookie", browser.cookie()}};
+  EXPECT_EQ(client.Post("/projects?title=x", form, "bytes", "text/plain")->status, 403);
+  // The key is the owner's.
+  const auto allowed = fs::status(at("studio") / ".key").permissions();
+  EXPECT_EQ(allowed & (fs::perms::group_all | fs::perms::others_all), fs::perms::none);
+  browser.process().send(SIGINT);
+  EXPECT_EQ(browser.process().wait(std::chrono::seconds(5)).exit_code, 0);
+}
+
+TEST_F(Studio, KeepsItsKeySoThatAnOpenPageSurvives) {
+  std::string key;
+  {
+    Browser browser(path("studio"));
+    key = browser.key();
+  }
+  Browser again(path("studio"));
+  EXPECT_EQ(again.key(), key);
+}
+
+TEST_F(Studio, RefusesWhatIsNoPictureAndKeepsNothingOfIt) {
+  Browser browser(path("studio"));
+  const auto text = browser.post("/projects?title=notes.txt", std::string("no picture"));
+  EXPECT_EQ(text->status, 400);
+  EXPECT_THAT(error_of(text), HasSubstr("notes.txt"));
+  EXPECT_THAT(error_of(text), Not(HasSubstr("original")));
+  EXPECT_EQ(browser.post("/projects?title=empty.png", std::string())->status, 400);
+  EXPECT_TRUE(json::parse(browser.get("/studio.json")->body)["projects"].empty());
+  // Titles are names of folders inside, whatever they are.
+  const std::string bytes = testing::read_bytes(picture("rings.png"));
+  const auto odd = browser.post("/projects?title=..%2F..%2Fa%20b%00%22.png", bytes);
+  const std::string name = json::parse(odd->body)["name"];
+  EXPECT_EQ(name.find_first_of("/."), std::string::npos);
+  EXPECT_TRUE(fs::exists(at("studio") / name / "studio.json"));
+}
+
+TEST_F(Studio, ServesNothingOutsideOfItsProjects) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const fs::path folder = at("studio") / name;
+  std::ofstream(at("secret.png")) << "secret";
+  fs::create_symlink(at("secret.png"), folder / "link.png");
+  const std::string files = "/projects/" + name + "/files/";
+  EXPECT_EQ(browser.get(files + "picture.png")->status, 200);
+  for (const char* path : {"../../secret.png", "..%2F..%2Fsecret.png", "%2e%2e/%2e%2e/secret.png",
+                           "link.png", ".studio/lens-1.json", "", "//", "lens-1", "%00", "%"}) {
+    EXPECT_EQ(browser.get(files + path)->status, 404) << path;
+  }
+  for (const char* path : {"/projects/../studio.json", "/projects/.key/state.json",
+                           "/projects/none/state.json", "/none", "/projects/x"}) {
+    EXPECT_EQ(browser.get(path)->status, 404) << path;
+  }
+}
+
+TEST_F(Studio, NamesASettingsFaultAndKeepsWhatWasThere) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const std::string place = "/projects/" + name + "/settings";
+  EXPECT_EQ(browser.post(place, kSmall)->status, 200);
+  const json before = browser.state(name);
+  const auto refused = [&](const json& change, const std::string& words) {
+    const auto answer = browser.post(place, change);
+    EXPECT_EQ(answer->status, 400);
+    EXPECT_THAT(error_of(answer), HasSubstr(words));
+  };
+  refused({{"settings", {{"--width", -3}}}}, "--width -3");
+  refused({{"settings", {{"--focal", 60}, {"--pixels", "many"}}}}, "--pixels");
+  refused({{"settings", {{"--out", "elsewhere"}}}}, "--out");
+  refused({{"settings", {{"--lamp", "FILE:/etc/passwd:9mrad"}}}}, "--lamp");
+  refused({{"workshop", {{"finish.pitch", 0}}}}, "finish.pitch");
+  refused({{"workshop", {{"finish.pitch", "0.05"}, {"finish.none", 1}}}}, "finish.none");
+  refused({{"workshop", {{"finish.tool", 77}}}}, "77");
+  EXPECT_EQ(browser.post(place, std::string("{"))->status, 400);
+  EXPECT_EQ(browser.state(name), before);
+  // Valid on their own, contradictory together: said beside the sizes.
+  browser.post(place, json{{"settings", {{"--focal", 2}}}});
+  EXPECT_THAT(browser.state(name)["light"].value("error", ""), HasSubstr("--focal"));
+}
+
+TEST_F(Studio, SaysTheBlursBeforeAnyDesign) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  browser.post("/projects/" + name + "/settings",
+               json{{"settings", {{"--lamp", "led:3mm@600mm"}, {"--focal", 200}}}});
+  const json light = browser.state(name)["light"];
+  EXPECT_EQ(light["lamp_mm"], 600.0);
+  // The image of 3 mm through the middle of the lens, whose 5 mm are as 5 / 1.49 of air.
+  const double pixel = light["picture_mm"][0].get<double>() / light["pixels"][0].get<double>();
+  const double image = 3.0 * (200.0 - 5.0) / (600.0 + 5.0 / 1.49);
+  EXPECT_EQ(light["blurs"][0]["cause"], "lamp");
+  EXPECT_NEAR(light["blurs"][0]["pixels"].get<double>(), image / pixel, 0.01);
+}
+
+TEST_F(Studio, LeadsFromPictureToASentProgram) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const std::string place = "/projects/" + name;
+  EXPECT_EQ(browser.post(place + "/run", json{{"step", "cam"}})->status, 400);  // No lens yet.
+  browser.post(place + "/settings", kSmall);
+  json now = browser.run(name, {{"step", "design"}});
+  ASSERT_EQ(now["job"]["status"], "done") << now["job"];
+  EXPECT_LT(now["lens"]["mae"], 0.05);
+  // The command that is shown is the one that ran: it makes the same bytes.
+  const std::string command = now["job"]["command"];
+  EXPECT_EQ(command, "lensforge design picture.png --focal 40 --pixels 24 --width 6 --out lens-1");
+  run({"design", (at("studio") / name / "picture.png").string(), "--focal", "40", "--pixels", "24",
+       "--width", "6", "--out", path("same")});
+  EXPECT_EQ(testing::read_bytes(at("same") / "surface.ply"),
+            testing::read_bytes(at("studio") / name / "lens-1" / "surface.ply"));
+
+  now = browser.run(name, {{"step", "cam"}});
+  ASSERT_EQ(now["job"]["status"], "done") << now["job"];
+  EXPECT_LE(now["part"]["range"]["p10"], now["part"]["range"]["p90"]);
+  EXPECT_EQ(now["part"]["programs"].back(), "finish.ngc");
+  EXPECT_TRUE(now["part"]["current"]);
+  now = browser.run(name, {{"step", "export"}, {"format", "step"}});
+  EXPECT_EQ(now["job"]["status"], "done") << now["job"];
+  const auto solid = browser.get(place + "/files/lens-1/lens.step");
+  EXPECT_THAT(solid->body, HasSubstr("ISO-10303-21"));
+  EXPECT_THAT(solid->get_header_value("Content-Disposition"), HasSubstr("lens.step"));
+
+  // At a thousand times the speed, and held and resumed by keys on the way at once.
+  browser.post(place + "/send", json{{"program", "finish.ngc"}, {"port", "sim:grbl@1000x"}});
+  now = browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; });
+  EXPECT_EQ(now["cut"]["status"], "done") << now["cut"];
+  EXPECT_EQ(now["cut"]["percent"], 100.0);
+  EXPECT_EQ(now["cut"]["tool"].size(), 2U);
+}
+
+TEST_F(Studio, GoesBackToAnEarlierLensAndItsSettings) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const std::string place = "/projects/" + name;
+  browser.post(place + "/settings", kSmall);
+  browser.run(name, {{"step", "design"}});
+  browser.post(place + "/settings", json{{"settings", {{"--focal", 50}}}});
+  json now = browser.run(name, {{"step", "design"}});
+  EXPECT_EQ(now["lens"]["version"], 2);
+  now = json::parse(browser.post(place + "/undo")->body);
+  EXPECT_EQ(now["lens"]["version"], 1);
+  EXPECT_EQ(now["settings"]["--focal"], 40);
+  EXPECT_EQ(browser.post(place + "/undo")->status, 400);
+  now = json::parse(browser.post(place + "/redo")->body);
+  EXPECT_EQ(now["lens"]["version"], 2);
+  EXPECT_EQ(now["settings"]["--focal"], 50);
+}
+
+/// A design of some minutes.
+const json kLong{{"settings", {{"--pixels", 128}, {"--quality", "paper"}}}};
+
+TEST_F(Studio, PausesWithinASecondAndGoesOn) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const std::string place = "/projects/" + name;
+  browser.post(place + "/settings", kLong);
+  browser.post(place + "/run", json{{"step", "design"}});
+  json now = browser.wait(name, [](const json& s) { return !s["job"]["live"].is_null(); });
+  EXPECT_EQ(browser.get(now["job"]["live"]["picture"])->status, 200);
+  EXPECT_EQ(browser.post(place + "/run", json{{"step", "design"}})->status, 400);
+  const auto start = std::chrono::steady_clock::now();
+  browser.post(place + "/pause");
+  now = browser.wait(name, [](const json& s) { return s["job"]["status"] == "paused"; });
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
+  now = json::parse(browser.post(place + "/continue")->body);
+  EXPECT_THAT(now["job"]["command"].get<std::string>(), HasSubstr("--resume"));
+  browser.wait(name, [](const json& s) { return s["job"]["status"] == "running"; });
+}
+
+TEST_F(Studio, AKilledStudioLosesNothing) {
+  std::string name;
+  {
+    Browser browser(path("studio"));
+    name = browser.project("rings.png");
+    browser.post("/projects/" + name + "/settings", kLong);
+    browser.post("/projects/" + name + "/run", json{{"step", "design"}});
+    browser.wait(name, [](const json& s) { return !s["job"]["live"].is_null(); });
+    browser.process().send(SIGKILL);
+    browser.process().wait();
+  }
+  Browser again(path("studio"));
+  json now = again.state(name);
+  EXPECT_EQ(now["job"]["status"], "interrupted");
+  EXPECT_EQ(now["settings"], kLong["settings"]);
+  // The design that lost its studio lets go of the folder within a second.
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  again.post("/projects/" + name + "/continue");
+  now = again.wait(name, [](const json& s) { return s["job"]["words"] != ""; });
+  EXPECT_EQ(now["job"]["status"], "running") << now["job"];
+}
+
+TEST_F(Studio, RefusesAPortOrFolderThatItCannotHave) {
+  std::ofstream(at("file")) << "x";
+  const Outcome file = run({"studio", path("file"), "--port", "0"});
+  EXPECT_EQ(file.exit_code, 2);
+  EXPECT_THAT(file.err, HasSubstr("FOLDER"));
+  Browser browser(path("studio"));
+  const Outcome taken = run({"studio", path("other"), "--port", std::to_string(browser.port())});
+  EXPECT_EQ(taken.exit_code, 2);
+  EXPECT_THAT(taken.err, HasSubstr("in use"));
+  EXPECT_EQ(run({"studio", "--port", "70000"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace lensforge::scenario
