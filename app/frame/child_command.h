@@ -16,8 +16,8 @@ struct ChildEnd {
 
 /// A command in a process of its own.
 struct ChildCommand {
-  Arguments program;  ///< Words that start a command; none: this very program.
-  Arguments words;    ///< The command and its arguments.
+  Arguments program;                  ///< Words that start a command; none: this very program.
+  Arguments words;                    ///< The command and its arguments.
   std::filesystem::path out;          ///< Receives standard output; replaced.
   std::filesystem::path log;          ///< Standard error is added to it.
   std::filesystem::path folder = {};  ///< In which it works; empty: this process's.

@@ -164,7 +164,7 @@ bool Project::is_project(const fs::path& folder) {
 
 fs::path Project::create(const fs::path& parent, const std::string& title, std::string_view bytes) {
   const std::string stem = fs::path(title).stem().string();
-  const fs::path folder = free_folder(parent, name_of(stem));
+  fs::path folder = free_folder(parent, name_of(stem));
   const std::string extension = lower_case(fs::path(title).extension().string());
   const bool plain =
       extension.size() <= 6 &&
@@ -453,7 +453,7 @@ fs::path Project::file(std::string_view path) const {
     inside /= part;
   }
   std::error_code none;
-  const fs::path whole = fs::canonical(folder_ / inside, none);
+  fs::path whole = fs::canonical(folder_ / inside, none);
   if (none || !fs::is_regular_file(whole)) throw NotFound{"no such file"};
   const fs::path relative = whole.lexically_relative(fs::canonical(folder_));
   // A link may lead out of the folder.
@@ -466,7 +466,7 @@ std::string Project::live_picture(bool error) const {
 }
 
 fs::path Project::relief() const {
-  const fs::path file = folder_ / kKept / (lens_name() + "-relief.png");
+  fs::path file = folder_ / kKept / (lens_name() + "-relief.png");
   if (!fs::is_regular_file(lens_folder() / lens_file::kJson)) throw NotFound{"no lens yet"};
   if (!fs::exists(file)) {
     const Lens lens = read_lens(lens_folder());

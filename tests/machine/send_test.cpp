@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+
 #include "core/error.h"
 #include "core/temp_folder.h"
 #include "machine/stream/journal.h"
@@ -56,6 +58,29 @@ struct Notes : JobWatcher {
   std::vector<std::string> said;
   int events = 0;
 };
+
+TEST_F(SendJob, ASimulatedMillKeepsTheSpeedThatIsAsked) {
+  SendOptions options = simulated();
+  options.port = "sim:grbl@100x";
+  JobWatcher nobody;
+  const auto start = std::chrono::steady_clock::now();
+  const SendSummary summary = send_job(program_.string(), options, nobody, {}, {});
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+  ASSERT_TRUE(summary.result && summary.result->done());
+  EXPECT_GT(summary.result->seconds, 10.0);
+  EXPECT_GE(spent.count(), summary.result->seconds / 100.0);
+}
+
+TEST_F(SendJob, RefusesASpeedThatIsNone) {
+  JobWatcher nobody;
+  for (const char* port : {"sim:grbl@0x", "sim:grbl@", "sim:grbl@fast", "sim:grbl@-1x",
+                           "sim:grbl@1e9x", "sim:grbl@5"}) {
+    SendOptions options = simulated();
+    options.port = port;
+    EXPECT_THAT(message_of<InputError>([&] { send_job(program_, options, nobody); }),
+                HasSubstr("--port sim:"));
+  }
+}
 
 TEST_F(SendJob, AProgramThatLinksTheLibrarySendsAsTheCommandDoes) {
   Notes notes;

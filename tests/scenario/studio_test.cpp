@@ -62,7 +62,7 @@ class Browser {
   /// A project with a picture of the fixtures as it is.
   std::string project(const std::string& name) {
     const auto made = post("/projects?title=" + name, testing::read_bytes(picture(name)));
-    const std::string own = json::parse(made->body)["name"];
+    std::string own = json::parse(made->body)["name"];
     post("/projects/" + own + "/picture");
     return own;
   }
@@ -233,7 +233,13 @@ TEST_F(Studio, LeadsFromPictureToASentProgram) {
   EXPECT_THAT(solid->body, HasSubstr("ISO-10303-21"));
   EXPECT_THAT(solid->get_header_value("Content-Disposition"), HasSubstr("lens.step"));
 
-  // At a thousand times the speed, and held and resumed by keys on the way at once.
+  // Ended by a key, then from the beginning at a thousand times the speed.
+  browser.post(place + "/send", json{{"program", "finish.ngc"}, {"port", "sim:grbl@20x"}});
+  now = browser.wait(name, [](const json& s) { return s["cut"]["state"] == "Run"; });
+  EXPECT_EQ(browser.post(place + "/send", json{{"program", "rough.ngc"}})->status, 400);
+  browser.post(place + "/key", json{{"key", "Q"}});
+  now = browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; });
+  EXPECT_EQ(now["cut"]["status"], "interrupted") << now["cut"];
   browser.post(place + "/send", json{{"program", "finish.ngc"}, {"port", "sim:grbl@1000x"}});
   now = browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; });
   EXPECT_EQ(now["cut"]["status"], "done") << now["cut"];
@@ -298,7 +304,8 @@ TEST_F(Studio, AKilledStudioLosesNothing) {
   // The design that lost its studio lets go of the folder within a second.
   std::this_thread::sleep_for(std::chrono::seconds(2));
   again.post("/projects/" + name + "/continue");
-  now = again.wait(name, [](const json& s) { return s["job"]["words"] != ""; });
+  now =
+      again.wait(name, [](const json& s) { return !s["job"]["words"].get<std::string>().empty(); });
   EXPECT_EQ(now["job"]["status"], "running") << now["job"];
 }
 
