@@ -20,12 +20,12 @@ namespace lensforge::app {
 
 /// Data that a view of a running job needs in addition to the events.
 struct JobView {
-  std::int64_t bytes = 0;       ///< Size of the file.
-  std::int64_t lines = 0;       ///< In the file.
-  std::int64_t first_byte = 0;  ///< First byte of this run.
-  double estimate = 0.0;        ///< Run time of the whole program, s.
-  int planner_blocks = 0;       ///< 0 if not known.
-  int rx_bytes = 0;             ///< 0 if not known.
+  std::int64_t bytes = 0;                            ///< Size of the file.
+  std::int64_t lines = 0;                            ///< In the file.
+  std::int64_t first_byte = 0;                       ///< First byte of this run.
+  double estimate = 0.0;                             ///< Run time of the whole program, s.
+  int planner_blocks = 0;                            ///< 0 if not known.
+  int rx_bytes = 0;                                  ///< 0 if not known.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< Of the program in the machine (G54), mm.
 };
 
