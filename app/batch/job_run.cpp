@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "app/batch/job_run.h"
 
-
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -48,12 +47,6 @@ std::string content_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// The JSON in a file; null if there is none.
-json json_in(const fs::path& file) {
-  json value = json::parse(content_of(file), nullptr, false);
-  return value.is_discarded() ? json() : value;
-}
-
 /// job.json in the job's folder or in that of its work; null if there is none.
 json record_in(const fs::path& folder) {
   json record = json_in(folder / kJobFile);
@@ -68,17 +61,6 @@ JobOutcome outcome_of(const json& record, bool earlier) {
   const bool missed = record["status"] == "limit";
   return {missed ? Status::kLimitMissed : Status::kDone, record["message"], earlier,
           record["seconds"]};
-}
-
-/// The last line that a command wrote, without the program's name.
-std::string last_line(const std::string& text) {
-  const std::size_t end = text.find_last_not_of("\n\r ");
-  if (end == std::string::npos) return "";
-  const std::size_t before = text.find_last_of('\n', end);
-  std::string line = text.substr(before == std::string::npos ? 0 : before + 1, end - before);
-  if (before == std::string::npos) line = text.substr(0, end + 1);
-  constexpr std::string_view kProgram = "lensforge: ";
-  return line.starts_with(kProgram) ? line.substr(kProgram.size()) : line;
 }
 
 /// One job's work folder while a batch holds it.

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -131,6 +132,20 @@ ChildEnd run_child(const ChildCommand& child, const std::stop_token& stop) {
   const int code = wait_for(process, stop);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
   return {code, spent.count()};
+}
+
+std::string last_line(std::string_view text) {
+  text = text.substr(0, text.find_last_not_of("\n\r ") + 1);  // npos + 1 is 0.
+  std::string_view line = text.substr(text.find_last_of('\n') + 1);
+  constexpr std::string_view kProgram = "lensforge: ";
+  if (line.starts_with(kProgram)) line.remove_prefix(kProgram.size());
+  return std::string(line);
+}
+
+nlohmann::json json_in(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  nlohmann::json value = nlohmann::json::parse(stream, nullptr, false);
+  return value.is_discarded() ? nlohmann::json() : value;
 }
 
 }  // namespace lensforge::app

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <stop_token>
+#include <string>
+#include <string_view>
 
 #include "app/frame/command_line.h"
 
@@ -28,5 +31,11 @@ struct ChildCommand {
 /// Ctrl-C. @throw RunError with the system's reason if no process can be made or a file not be
 /// written.
 ChildEnd run_child(const ChildCommand& child, const std::stop_token& stop);
+
+/// The last line that a command wrote, without the program's name; empty if there is none.
+std::string last_line(std::string_view text);
+
+/// The JSON in a file, such as a command's result; null if there is none.
+nlohmann::json json_in(const std::filesystem::path& file);
 
 }  // namespace lensforge::app

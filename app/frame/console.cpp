@@ -110,6 +110,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kBarInterval{100};
 /// Lines where there is no terminal: often enough to follow short work, and a log of hours short.
+/// The first comes late: an error of the input is to be the only line.
 constexpr double kLineShare = 0.02;  ///< Of the time so far.
 constexpr double kMinLineSeconds = 1.0;
 constexpr double kMaxLineSeconds = 5.0;
@@ -231,10 +232,11 @@ std::string ProgressDisplay::line(double seconds) const {
 void ProgressDisplay::draw() {
   const Clock::time_point now = Clock::now();
   const std::chrono::duration<double> spent = now - start_;
+  const double line_wait =
+      shown_ == start_ ? kMaxLineSeconds
+                       : std::clamp(kLineShare * spent.count(), kMinLineSeconds, kMaxLineSeconds);
   const std::chrono::duration<double> wait =
-      terminal_ ? kBarInterval
-                : std::chrono::duration<double>(
-                      std::clamp(kLineShare * spent.count(), kMinLineSeconds, kMaxLineSeconds));
+      terminal_ ? kBarInterval : std::chrono::duration<double>(line_wait);
   if (now - shown_ < wait) return;
   shown_ = now;
   const std::string text = line(spent.count());

@@ -12,6 +12,7 @@
 
 #include "app/batch/batch_job.h"
 #include "app/commands/design_command.h"
+#include "app/frame/child_command.h"
 #include "app/frame/common_output.h"
 #include "app/frame/option_set.h"
 #include "app/studio/studio_forms.h"

@@ -34,15 +34,11 @@ constexpr std::chrono::milliseconds kLook{300};
 constexpr std::streamoff kTail = 4096;
 
 /// Last line of a log, without the program's name.
-std::string last_line(const fs::path& log) {
+std::string last_line_of(const fs::path& log) {
   std::ifstream stream(log, std::ios::binary | std::ios::ate);
   const std::streamoff size = stream ? static_cast<std::streamoff>(stream.tellg()) : 0;
   stream.seekg(std::max<std::streamoff>(0, size - kTail));
-  std::string text(std::istreambuf_iterator<char>(stream), {});
-  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
-  std::string line = text.substr(text.rfind('\n') + 1);  // npos + 1 is 0.
-  constexpr std::string_view kProgram = "lensforge: ";
-  return line.starts_with(kProgram) ? line.substr(kProgram.size()) : line;
+  return last_line(std::string(std::istreambuf_iterator<char>(stream), {}));
 }
 
 /// The share in "design, level 2 of 2  57 %  MAE 0.0012": the number before the first " %".
@@ -85,13 +81,6 @@ std::string end_word(int exit_code, bool stopped) {
 
 }  // namespace
 
-json json_in(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(stream), {});
-  json value = json::parse(text, nullptr, false);
-  return value.is_discarded() ? json() : value;
-}
-
 std::string command_text(const Arguments& words) {
   std::string text = "lensforge";
   for (const std::string& word : words) text.append(" ").append(shell_word(word));
@@ -123,10 +112,11 @@ StudioJob::StudioJob(const fs::path& folder, StudioTask task, ComputeTurn* turn)
   }
   fs::remove(folder_ / (task_.files + ".log"));
   set(turn_ != nullptr ? "waiting" : "running", "");
-  runner_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  // The runner stops the watcher at its end.
   if (!task_.checkpoint.empty()) {
     watcher_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
   }
+  runner_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 StudioJob::~StudioJob() {
@@ -164,7 +154,7 @@ void StudioJob::run(const std::stop_token& stop) {
     code = run_child({{}, words, folder_ / (task_.files + ".out"), log, folder_, input_.number()},
                      stop)
                .exit_code;
-    message = code == kDone ? "" : last_line(log);
+    message = code == kDone ? "" : last_line_of(log);
   } catch (const std::exception& e) {
     message = e.what();
   }
@@ -217,7 +207,7 @@ void StudioJob::watch(const std::stop_token& stop) {
 json StudioJob::state() const {
   const std::lock_guard lock(mutex_);
   const bool runs = status_ == "running" || status_ == "stopping";
-  const std::string words = runs ? last_line(folder_ / (task_.files + ".log")) : "";
+  const std::string words = runs ? last_line_of(folder_ / (task_.files + ".log")) : "";
   const std::optional<double> share = share_in(words);
   json state{{"step", task_.step},
              {"status", status_},

@@ -83,9 +83,6 @@ class StudioJob {
 /// running is interrupted. @param files  StudioTask::files.
 nlohmann::json earlier_job(const std::filesystem::path& folder, const std::string& files);
 
-/// The JSON in a file; null if there is none.
-nlohmann::json json_in(const std::filesystem::path& file);
-
 /// "lensforge design picture.png --out lens-1", for a shell.
 std::string command_text(const Arguments& words);
 

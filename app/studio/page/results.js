@@ -118,7 +118,7 @@ function partFigures(part) {
   const spread = range ? [rangeDrawing(mae, range), soft(`P10–P90 ${number(range.p10, 3)}–${number(range.p90, 3)}${part.model === "waves" ? " by rays" : ""}: four of five parts`)] : [soft(part.range_words)];
   return [
     one("MAE from the picture", number(mae, 3), ...spread),
-    one("Leakage", percent(part.leakage), soft("light in what should be dark")),
+    one("Leakage", percent(part.leakage), soft("light beyond the design’s")),
     part.contrast ? one("Contrast", `${Math.round(part.contrast)} : 1`, soft("light to dark")) : null,
     one("On the machine", minutesText(part.minutes), soft(hoursText(part.operations || []))),
   ].filter(Boolean);
