@@ -237,15 +237,28 @@ int Project::next_version() const {
 
 void Project::step_version(int by) {
   require_idle();
-  const std::vector<int> all = versions();
-  const auto at = std::find(all.begin(), all.end(), record_.value("current", 0));
-  if (at == all.end() || (by < 0 ? at == all.begin() : std::next(at) == all.end())) {
-    throw InputError(by < 0 ? "there is no earlier lens" : "there is no later lens");
+  const int current = record_.value("current", 0);
+  int next = 0;
+  for (const int version : versions()) {
+    if (by < 0 && version < current) next = version;
+    if (by > 0 && version > current && next == 0) next = version;
   }
-  record_["current"] = *(at + by);
+  if (next == 0) throw InputError(by < 0 ? "there is no earlier lens" : "there is no later lens");
+  record_["current"] = next;
   const json kept = record_.value("versions", json::object());
-  const json settings = kept.value(std::to_string(*(at + by)), json());
+  const json settings = kept.value(std::to_string(next), json());
   if (settings.is_object()) record_["settings"] = settings;
+  save();
+}
+
+void Project::leave_failed_design() {
+  if (!job_ || job_->running() || job_->task().checkpoint.empty()) return;
+  const fs::path lens = lens_folder();
+  if (fs::exists(lens / lens_file::kJson) || fs::exists(lens / lens_file::kCheckpoint)) return;
+  if (job_->state()["status"] != "failed") return;
+  // The settings stay: they are to be mended.
+  const std::vector<int> all = versions();
+  record_["current"] = all.empty() ? 0 : all.back();
   save();
 }
 
@@ -400,6 +413,9 @@ void Project::resume() {
   if (!record.is_object()) throw InputError("there is nothing to go on with");
   StudioTask task{record.value("step", ""), record.value("words", Arguments()), files};
   if (task.step == "design") {
+    const auto out = std::find(task.words.begin(), task.words.end(), "--out");
+    const std::string prefix = kLensPrefix;
+    record_["current"] = std::stoi((out + 1)->substr(prefix.size()));
     task.checkpoint = lens_folder() / lens_file::kCheckpoint;
     const bool begun = fs::exists(task.checkpoint) || fs::exists(lens_folder() / lens_file::kJson);
     const bool said =
@@ -490,7 +506,16 @@ json Project::picture_json(const std::string& address) const {
           {"changes", record_.value("changes", json::array())}};
 }
 
-json Project::light_json() const {
+json Project::light_json() {
+  json asked{record_["settings"], record_["workshop"], record_.value("size", json())};
+  if (asked != asked_) {
+    light_ = computed_light();
+    asked_ = std::move(asked);
+  }
+  return light_;
+}
+
+json Project::computed_light() const {
   if (!fs::is_regular_file(folder_ / kPicture)) return nullptr;
   try {
     DesignSettings settings;
@@ -688,7 +713,8 @@ json Project::cut_json(const std::string& address) const {
   return cut;
 }
 
-json Project::state(const std::string& address) const {
+json Project::state(const std::string& address) {
+  leave_failed_design();
   const std::vector<int> all = versions();
   json list = json::array();
   for (const int version : all) {

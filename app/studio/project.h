@@ -34,7 +34,7 @@ class Project {
   static bool is_project(const std::filesystem::path& folder);
 
   /// Everything that the page shows of it. @param address  of its files: "/projects/rose/".
-  [[nodiscard]] nlohmann::json state(const std::string& address) const;
+  [[nodiscard]] nlohmann::json state(const std::string& address);
   /// "name", "picture", "words", "running".
   [[nodiscard]] nlohmann::json summary(const std::string& address) const;
 
@@ -66,6 +66,8 @@ class Project {
   void require_idle() const;
   void require_picture() const;
   void step_version(int by);
+  /// Goes back to the last lens if a design was refused or broke before there was anything of it.
+  void leave_failed_design();
   [[nodiscard]] std::string lens_name() const;
   [[nodiscard]] std::filesystem::path lens_folder() const { return folder_ / lens_name(); }
   [[nodiscard]] std::vector<int> versions() const;
@@ -79,7 +81,8 @@ class Project {
   [[nodiscard]] Arguments send_words(const nlohmann::json& request) const;
 
   [[nodiscard]] nlohmann::json picture_json(const std::string& address) const;
-  [[nodiscard]] nlohmann::json light_json() const;
+  [[nodiscard]] nlohmann::json light_json();
+  [[nodiscard]] nlohmann::json computed_light() const;
   [[nodiscard]] nlohmann::json commands_json() const;
   [[nodiscard]] nlohmann::json plan_json() const;
   [[nodiscard]] nlohmann::json lens_json(const std::string& address) const;
@@ -93,6 +96,8 @@ class Project {
   std::filesystem::path folder_;
   ComputeTurn* turn_;
   nlohmann::json record_;  ///< studio.json
+  nlohmann::json asked_;   ///< What light_ is of: a page asks again and again.
+  nlohmann::json light_;
   std::unique_ptr<StudioJob> job_;
   std::unique_ptr<StudioJob> cut_;
 };

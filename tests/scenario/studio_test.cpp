@@ -265,6 +265,20 @@ TEST_F(Studio, GoesBackToAnEarlierLensAndItsSettings) {
   EXPECT_EQ(now["settings"]["--focal"], 50);
 }
 
+TEST_F(Studio, KeepsTheLensWhenTheNextDesignIsRefused) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const std::string place = "/projects/" + name;
+  browser.post(place + "/settings", kSmall);
+  browser.run(name, {{"step", "design"}});
+  browser.post(place + "/settings", json{{"settings", {{"--focal", 2}}}});
+  json now = browser.run(name, {{"step", "design"}});
+  EXPECT_EQ(now["job"]["status"], "failed");
+  EXPECT_THAT(now["job"]["message"].get<std::string>(), HasSubstr("--focal"));
+  EXPECT_EQ(now["lens"]["version"], 1);
+  EXPECT_EQ(now["settings"]["--focal"], 2);
+}
+
 /// A design of some minutes.
 const json kLong{{"settings", {{"--pixels", 128}, {"--quality", "paper"}}}};
 
