@@ -51,7 +51,10 @@ TEST(StoredNumbers, OfATooWideRangeHaveLargerSteps) {
 
 TEST(StoredNumbers, NeedLittleRoomWhereTheyChangeSmoothly) {
   std::vector<double> values;
-  for (int i = 0; i < 300 * 300; ++i) values.push_back(1e-4 * (i % 300) * (i / 300));
+  values.reserve(300 * 300);
+  for (int row = 0; row < 300; ++row) {
+    for (int column = 0; column < 300; ++column) values.push_back(1e-4 * column * row);
+  }
   EXPECT_LT(store_numbers("z", values, 300, 1e-6).text.size(), 90000U / 2);
 }
 
