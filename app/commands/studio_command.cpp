@@ -23,13 +23,22 @@ constexpr int kLargestPort = 65535;
 void describe(Description& d, StudioSettings& settings) {
   d.text("FOLDER", settings.folder, "", "folder of the projects; made if there is none");
   d.whole("--port", settings.port, Limits::between(0, kLargestPort),
-          "port of the page at 127.0.0.1; 0 takes a free one");
+          "port of the page at 127.0.0.1; 0 takes a free one")
+      .essential = true;
+}
+
+/// The common options that were given, for the commands of the studio.
+Arguments common_words(const CommonOptions& common) {
+  Arguments words;
+  if (common.threads > 0) words.insert(words.end(), {"--threads", std::to_string(common.threads)});
+  if (common.device != "auto") words.insert(words.end(), {"--device", common.device});
+  return words;
 }
 
 CommandResult run(CommandFrame& frame, StudioSettings& settings) {
   frame.begin();
   {
-    const Studio studio(settings.folder, settings.port);
+    const Studio studio(settings.folder, settings.port, common_words(frame.options().common()));
     frame.console().note("the studio is at " + studio.address());
     frame.console().begin();
     std::mutex mutex;

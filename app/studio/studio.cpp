@@ -150,10 +150,11 @@ json parsed(std::string_view body) {
 /// Projects and requests. Everything is called by the server's thread.
 class Studio::Content {
  public:
-  Content(fs::path folder, int port)
+  Content(fs::path folder, int port, Arguments common)
       : folder_(std::move(folder)),
         key_(key_of(folder_)),
         page_(studio_page()),
+        turn_(std::move(common)),
         server_({port, "--port", kMaxBody},
                 [this](const LoopbackRequest& request) { return guarded(request); }) {}
 
@@ -287,14 +288,14 @@ class Studio::Content {
   LoopbackServer server_;  ///< Last, so that it ends first.
 };
 
-Studio::Studio(const fs::path& folder, int port) {
+Studio::Studio(const fs::path& folder, int port, Arguments common) {
   std::error_code failed;
   fs::create_directories(folder, failed);
   if (!is_folder(folder)) {
     throw InputError("FOLDER " + folder.string() + ": is no folder and cannot be made one");
   }
   require_writable_folder(folder);
-  content_ = std::make_unique<Content>(fs::canonical(folder), port);
+  content_ = std::make_unique<Content>(fs::canonical(folder), port, std::move(common));
 }
 
 Studio::~Studio() = default;

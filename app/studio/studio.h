@@ -5,6 +5,8 @@
 #include <memory>
 #include <string>
 
+#include "app/frame/command_line.h"
+
 namespace lensforge::app {
 
 /// Serves the page that leads from a picture to a part, to browsers on this machine, and runs the
@@ -13,8 +15,9 @@ namespace lensforge::app {
 class Studio {
  public:
   /// @param folder  of the projects; made if it does not exist. @param port  0 takes a free one.
+  /// @param common  words that every computing command gets: --threads, --device.
   /// @throw InputError naming folder or --port.
-  Studio(const std::filesystem::path& folder, int port);
+  Studio(const std::filesystem::path& folder, int port, Arguments common);
   /// Interrupts all jobs; they can be resumed.
   ~Studio();
   Studio(const Studio&) = delete;

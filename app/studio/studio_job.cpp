@@ -151,6 +151,9 @@ void StudioJob::run(const std::stop_token& stop) {
   try {
     Arguments words = task_.words;
     words.emplace_back("--json");
+    if (turn_ != nullptr) {
+      words.insert(words.end(), turn_->common().begin(), turn_->common().end());
+    }
     code = run_child({{}, words, folder_ / (task_.files + ".out"), log, folder_, input_.number()},
                      stop)
                .exit_code;

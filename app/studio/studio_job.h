@@ -10,6 +10,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "app/frame/command_line.h"
 #include "app/view/live_server.h"
@@ -20,6 +21,10 @@ namespace lensforge::app {
 /// A turn for work that keeps all processors busy: one job of a studio at a time.
 class ComputeTurn {
  public:
+  /// @param common  words that every such command gets: --threads, --device.
+  explicit ComputeTurn(Arguments common) : common_(std::move(common)) {}
+
+  [[nodiscard]] const Arguments& common() const { return common_; }
   /// Waits until nobody else has the turn. @return false if `stop` was requested before.
   bool take(const std::stop_token& stop);
   void give_back();
@@ -28,6 +33,7 @@ class ComputeTurn {
   std::mutex mutex_;
   std::condition_variable_any free_;
   bool taken_ = false;
+  Arguments common_;
 };
 
 /// A command that a project runs.
