@@ -27,6 +27,7 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/lens/lens.h"
+#include "core/lens/setup_json.h"
 #include "core/optics/picture_blur.h"
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
@@ -60,6 +61,13 @@ constexpr int kParts = 12;
 /// End of the events file that is read for what was said last, bytes.
 constexpr std::streamoff kEventsTail = 65536;
 constexpr std::size_t kMessages = 6;
+
+/// True for a few letters and digits: an extension.
+bool is_word(const std::string& text) {
+  constexpr std::size_t kLongest = 5;
+  return !text.empty() && text.size() <= kLongest &&
+         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789") == std::string::npos;
+}
 
 /// Letters, digits and '-' of a title: a folder's name.
 std::string name_of(const std::string& title) {
@@ -129,11 +137,7 @@ constexpr NamedContent kLensFiles[] = {{lens_file::kSurface, "the surface as a m
                                        {lens_file::kJson, "what it is, JSON"}};
 constexpr NamedContent kPartPictures[] = {{cam_file::kWall, "Light on the wall from the part"},
                                           {cam_file::kLeakage, "Where light leaks"}};
-constexpr NamedContent kPartFiles[] = {{"rough.ngc", "program for roughing"},
-                                       {"semi.ngc", "program for semi-finishing"},
-                                       {"large.ngc", "program for the larger ball"},
-                                       {"finish.ngc", "program for finishing"},
-                                       {cam_file::kMilledMesh, "the surface as milled, PLY"},
+constexpr NamedContent kPartFiles[] = {{cam_file::kMilledMesh, "the surface as milled, PLY"},
                                        {cam_file::kReport, "the report, JSON"}};
 
 template <std::size_t N>
@@ -167,9 +171,7 @@ fs::path Project::create(const fs::path& parent, const std::string& title, std::
   const std::string stem = fs::path(title).stem().string();
   fs::path folder = free_folder(parent, name_of(stem));
   const std::string extension = lower_case(fs::path(title).extension().string());
-  const bool plain =
-      extension.size() <= 6 &&
-      name_of(extension) == extension.substr(std::min<std::size_t>(1, extension.size()));
+  const bool plain = extension.size() > 1 && is_word(extension.substr(1));
   const std::string original = "original" + (plain ? extension : std::string());
   fs::create_directories(folder / kKept);
   try {
@@ -326,14 +328,13 @@ Arguments Project::setting_words(bool of_plan) const {
   return words;
 }
 
-/// True if `cam --tolerances` takes the lens.
-bool Project::can_vary() const {
-  const json lens = json_in(lens_folder() / lens_file::kJson);
-  if (!lens.is_object() || lens.contains("outline")) return false;
-  const json source = lens.value("source", json::object());
-  const bool wide = source.contains("angle_mrad") || source.contains("size_mm");
-  const bool flat = lens.value("front", json::object()).value("type", "flat") == "flat";
-  return !wide && flat && workshop_with(record_["workshop"]).process.finish.large_tool == 0;
+std::string Project::range_fault() const {
+  const fs::path file = lens_folder() / lens_file::kJson;
+  const json lens = json_in(file);
+  if (!lens.is_object()) return "there is no lens";
+  CamOptions cut;
+  cut.workshop = workshop_with(record_["workshop"]);
+  return tolerance_fault(cut, read_setup(JsonFields(lens, file.string()), lens_folder()));
 }
 
 Arguments Project::words_of(const std::string& step, const std::string& format) const {
@@ -353,7 +354,7 @@ Arguments Project::words_of(const std::string& step, const std::string& format) 
     if (fs::is_regular_file(folder_ / kWorkshop)) add({"--workshop", kWorkshop});
     // The programs that send takes, unless the workshop states its own.
     if (!record_["workshop"].contains("machine.post")) add({"--post", "grbl"});
-    if (can_vary()) add({"--tolerances", std::to_string(kParts)});
+    if (range_fault().empty()) add({"--tolerances", std::to_string(kParts)});
   } else if (step == "view") {
     words.push_back(lens_name());
     add({"--out", lens_name() + "/" + kView});
@@ -378,10 +379,8 @@ void Project::run(const json& request) {
     throw InputError("step " + json(step).dump() + ": must be plan, design, cam, view or export");
   }
   const std::string format = request.value("format", "step");
-  static const std::vector<std::string> kFormats{"step", "iges", "stl", "3mf", "obj", "ply", "glb"};
-  if (std::find(kFormats.begin(), kFormats.end(), format) == kFormats.end()) {
-    throw InputError("format " + json(format).dump() +
-                     ": must be step, iges, stl, 3mf, obj, ply or glb");
+  if (!is_word(format)) {
+    throw InputError("format " + json(format).dump() + ": must be a file's extension; step works");
   }
   require_idle();
   if (step == "plan" || step == "design") {
@@ -617,11 +616,22 @@ json Project::part_json(const std::string& address) const {
              {"words", t.value("words", "")}};
   }
   json programs = json::array();
+  json files = json::array();
   json operations = json::array();
   for (const json& one : report.value("operations", json::array())) {
     const std::string program = one.value("file", "");
-    if (!program.empty()) programs.push_back(program);
-    operations.push_back({{"name", one.value("name", "")}, {"minutes", one.value("minutes", 0.0)}});
+    const std::string name = one.value("name", "");
+    operations.push_back({{"name", name}, {"minutes", one.value("minutes", 0.0)}});
+    // Several operations may share a program.
+    if (program.empty() || std::find(programs.begin(), programs.end(), program) != programs.end()) {
+      continue;
+    }
+    programs.push_back(program);
+    files.push_back(
+        file_json(folder_ / within / program, within + "/" + program, "program: " + name, address));
+  }
+  for (json& other : files_of(folder_, within, kPartFiles, address)) {
+    files.push_back(std::move(other));
   }
   const fs::path workshop = folder_ / kWorkshop;
   const bool current =
@@ -636,9 +646,7 @@ json Project::part_json(const std::string& address) const {
   return {{"mae", last.value("mae", 0.0)},
           {"model", waves ? "waves" : "rays"},
           {"range", range},
-          {"range_words",
-           "No range: how much parts differ is forecast for a lamp without width, "
-           "a rectangle and one ball."},
+          {"range_words", "No range: cam --tolerances " + range_fault() + "."},
           {"leakage", by["leakage"].value("share", 0.0)},
           {"contrast", by["leakage"].value("contrast", json())},
           {"minutes", report.value("minutes", 0.0)},
@@ -649,7 +657,7 @@ json Project::part_json(const std::string& address) const {
           {"warnings", report.value("warnings", json::array())},
           {"pictures", files_of(folder_, within, kPartPictures, address)},
           {"report", address + "files/" + within + "/" + cam_file::kPage + "?" + modified(file)},
-          {"files", files_of(folder_, within, kPartFiles, address)},
+          {"files", files},
           {"programs", programs}};
 }
 

@@ -75,7 +75,8 @@ class Project {
   [[nodiscard]] bool computing() const { return job_ && job_->running(); }
   [[nodiscard]] bool sending() const { return cut_ && cut_->running(); }
 
-  [[nodiscard]] bool can_vary() const;
+  /// Why `cam --tolerances` does not take the lens; empty if it does.
+  [[nodiscard]] std::string range_fault() const;
   [[nodiscard]] Arguments words_of(const std::string& step, const std::string& format) const;
   [[nodiscard]] Arguments setting_words(bool of_plan) const;
   [[nodiscard]] Arguments send_words(const nlohmann::json& request) const;

@@ -61,7 +61,7 @@ std::string key_of(const fs::path& folder) {
   return key;
 }
 
-/// True unless it takes longer to find out for a better guess.
+/// Compares in a time that does not depend on where the texts differ.
 bool same_key(std::string_view a, std::string_view b) {
   unsigned difference = a.size() == b.size() ? 0U : 1U;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {

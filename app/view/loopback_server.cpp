@@ -122,14 +122,14 @@ class Connection : public std::enable_shared_from_this<Connection> {
     stream_.expires_after(kBodyTime);
     http::async_read(stream_, buffer_, *whole_,
                      [self = shared_from_this()](error_code error, std::size_t) {
-                       if (!error) self->respond(self->whole_->get(), self->whole_->get().body());
+                       const auto& request = self->whole_->get();
+                       if (!error) self->respond(request, request.body());
                      });
   }
 
-  void respond(const http::fields& header, std::string_view body) {
-    const bool post = whole_.has_value() || parser_.get().method() == http::verb::post;
-    const auto target = whole_ ? whole_->get().target() : parser_.get().target();
-    const std::string_view all(target.data(), target.size());
+  void respond(const http::request_header<>& header, std::string_view body) {
+    const bool post = header.method() == http::verb::post;
+    const std::string_view all(header.target().data(), header.target().size());
     const std::size_t end = std::min(all.find('?'), all.size());
     const auto cookie = header[http::field::cookie];
     LoopbackAnswer answer = answer_({post,

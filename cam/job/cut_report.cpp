@@ -427,10 +427,7 @@ constexpr std::string_view kSpreadParts = "50";
 std::string tolerance_hint(const CutSetup& cut, bool shared) {
   const CamOptions& options = cut.options;
   const OpticalSetup& setup = cut.lens->setup;
-  if (options.tolerances > 0 || larger_ball(options) != nullptr || setup.outline || setup.front ||
-      !setup.extent.none()) {
-    return "";
-  }
+  if (options.tolerances > 0 || !tolerance_fault(options, setup).empty()) return "";
   return joined({"lensforge ", shared ? std::string("nest") : "cam " + options.job,
                  " --tolerances ", kSpreadParts});
 }

@@ -68,29 +68,16 @@ void validate_sampling(const CamOptions& options) {
   }
 }
 
-void validate_tolerances(const CamOptions& options) {
-  if (options.tolerances > 0 && !options.render) {
+void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
+  if (options.tolerances == 0) return;
+  if (!options.render) {
     refuse("--tolerances", options.tolerances,
            "needs the predicted picture: leave out --no-render, or use --tolerances 0");
   }
-  if (options.tolerances > 0 && larger_ball(options) != nullptr) {
-    refuse("--tolerances", options.tolerances,
-           "draws parts of one finishing ball only: set finish.large_tool = 0, or use "
-           "--tolerances 0");
+  const std::string fault = tolerance_fault(options, setup);
+  if (!fault.empty()) {
+    refuse("--tolerances", options.tolerances, fault + "; use --tolerances 0");
   }
-}
-
-/// Parts have the error of an extended source where the design assumes a point.
-void validate_tolerances(const CamOptions& options, const OpticalSetup& setup) {
-  if (options.tolerances == 0) return;
-  if (setup.outline) {
-    refuse("--tolerances", options.tolerances,
-           "draws parts of rectangular lenses only; use --tolerances 0");
-  }
-  if (setup.extent.none() && !setup.front) return;
-  refuse("--tolerances", options.tolerances,
-         "draws parts with a flat front, for the light of a point or of one direction only; use "
-         "--tolerances 0");
 }
 
 void validate_outline(const CamOptions& options) {
@@ -234,6 +221,18 @@ Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& 
   return spacings;
 }
 
+std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup) {
+  if (larger_ball(options) != nullptr) {
+    return "draws parts of one finishing ball only: set finish.large_tool = 0";
+  }
+  if (setup.outline) return "draws parts of rectangular lenses only";
+  // Parts have the error of an extended source where the design assumes a point.
+  if (!setup.extent.none() || setup.front) {
+    return "draws parts with a flat front, for the light of a point or of one direction only";
+  }
+  return "";
+}
+
 void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate(options.workshop, "workshop");
   require_limits(options);
@@ -253,7 +252,6 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_tool_numbers(options);
   validate_decimals(options);
   validate_sampling(options);
-  validate_tolerances(options);
   validate_tolerances(options, setup);
   validate_wavelength(options, setup);
   validate_margin(options);

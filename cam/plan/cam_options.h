@@ -118,6 +118,9 @@ std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup);
 /// True if the outline is cut.
 bool cuts_outline(const CamOptions& options, const OpticalSetup& setup);
 
+/// Why CamOptions::tolerances cannot draw parts of such a lens, or so cut; empty if it can.
+std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup);
+
 /// @throw InputError naming option, value and rule if an option breaks its rule on its own or
 ///        against the size of the lens.
 void validate(const CamOptions& options, const OpticalSetup& setup);

@@ -34,8 +34,8 @@ struct RunOut {
 /// the continuation is z + t z_n + RunOut::height(t) z_nn: twice continuously differentiable
 /// beyond a spline; z_nn is 0 beyond other surfaces, whose curvature jumps from triangle to
 /// triangle anyway. At a corner the surface continued across one rim is continued across the other.
-/// Facets are continued by facets with the mean slopes of those that meet at the rim. Slopes above
-/// 1 go on with 1.
+/// Facets are continued by facets with the mean slopes of those that meet at the rim. Slopes and
+/// curvatures go on with at most 30 times their mean size over the rim, slopes with at most 1.
 ///
 /// Its mesh has the surface's vertices and triangles with their numbers, then those of the
 /// continuation.
