@@ -627,8 +627,8 @@ json Project::part_json(const std::string& address) const {
       continue;
     }
     programs.push_back(program);
-    files.push_back(
-        file_json(folder_ / within / program, within + "/" + program, "program: " + name, address));
+    files.push_back(file_json(folder_ / within / program, (fs::path(within) / program).string(),
+                              "program: " + name, address));
   }
   for (json& other : files_of(folder_, within, kPartFiles, address)) {
     files.push_back(std::move(other));
