@@ -27,6 +27,12 @@ class Reflect : public Scenario {
     return arguments;
   }
 
+  void wait_for_checkpoint(Process& process, const std::string& out) const {
+    while (!fs::exists(at(out) / "reflect.checkpoint")) {
+      ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(2))) << process.wait().err;
+    }
+  }
+
   /// @param mesh  the text of an OFF file.
   void expect_refused(const std::string& mesh, const Arguments& more,
                       const std::vector<std::string>& parts) const {
@@ -132,9 +138,8 @@ TEST_F(Reflect, TakesSolids) {
 TEST_F(Reflect, AnInterruptedRunKeepsItsShapeAndSaysSo) {
   Process process({"reflect", path("shape.off"), "--out", path("out"), "--method", "paper",
                    "--rim-updates", "10000"});
-  while (!fs::exists(at("out"))) {
-    ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(5))) << process.wait().err;
-  }
+  // A run that has its folder but nothing begun yet ends without a result.
+  wait_for_checkpoint(process, "out");
   process.send(SIGINT);
   EXPECT_EQ(process.wait().exit_code, 130);
   const nlohmann::json result = nlohmann::json::parse(content(at("out/reflect.json")));
@@ -163,12 +168,6 @@ class ReflectResume : public Reflect {
                            "0.03"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
-  }
-
-  void wait_for_checkpoint(Process& process, const std::string& out) const {
-    while (!fs::exists(at(out) / "reflect.checkpoint")) {
-      ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(2))) << process.wait().err;
-    }
   }
 
   void expect_same_shape(const std::string& a, const std::string& b) const {
