@@ -1,17 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Precompiled headers: two thirds of the time of a build go into reading headers, Eigen's and the
+# What makes whole builds fast: precompiled headers, and files of a target compiled several at a time.
+
+# Two thirds of the time of a build go into reading headers, Eigen's and the
 # standard library's above all (290 files of the command: 12.5 processor minutes without, 8.8 with).
 
-# ccache saves more and does not go along with them, so they are off where a launcher is set.
-set(precompile ON)
+# ccache saves more and does not go along with either, so they are off where a launcher is set.
+set(whole_builds ON)
 if(CMAKE_CXX_COMPILER_LAUNCHER)
-  set(precompile OFF)
+  set(whole_builds OFF)
 endif()
-option(LENSFORGE_PRECOMPILED_HEADERS "Precompile the headers of Eigen and the standard library" ${precompile})
+option(LENSFORGE_PRECOMPILED_HEADERS "Precompile the headers of Eigen and the standard library" ${whole_builds})
+option(LENSFORGE_UNITY "Compile up to eight files of a target as one" ${whole_builds})
 
 set(LENSFORGE_COMMON_HEADERS
   <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <memory> <optional> <span>
   <stop_token> <string> <vector> <Eigen/Core> <Eigen/Geometry>)
+
+# lensforge_unite(TARGET)
+# Templates that several files instantiate, Eigen's and GoogleMock's, are then compiled once: 101 processor
+# seconds become 43 for the tests of export, 69 become 36 for design/transport.
+function(lensforge_unite target)
+  if(LENSFORGE_UNITY)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    # Each of the files is the main one of its own types.
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-subobject-linkage>)
+  endif()
+endfunction()
 
 # lensforge_precompiled_headers(NAME HEADERS ... LINK ...)
 # An object library NAME that compiles nothing but its precompiled headers, for targets that link the

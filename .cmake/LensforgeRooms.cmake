@@ -43,14 +43,15 @@ function(lensforge_install target name)
   install(TARGETS ${target} EXPORT lensforgeTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 endfunction()
 
-# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ... [DOOR ...] [HEADERS ...] [INTERNAL])
+# lensforge_room(NAME FOLDER SOURCES ... PUBLIC ... PRIVATE ... [DOOR ...] [HEADERS ...] [INTERNAL] [APART])
 # A static library lensforge_NAME, alias lensforge::NAME, for the sources in FOLDER (relative to the
 # root). Its headers are reached as "FOLDER/header.h" through a link of its own, so that only
 # targets that link the room can include from it: the arrows between rooms are enforced. DOOR is a
 # header beside FOLDER that comes with the room. HEADERS are precompiled beside the common ones.
-# INTERNAL rooms are not installed.
+# INTERNAL rooms are not installed. APART ones have files that use the same names for things of their
+# own, and are never united.
 function(lensforge_room name folder)
-  cmake_parse_arguments(arg "INTERNAL" "DOOR" "SOURCES;PUBLIC;PRIVATE;HEADERS" ${ARGN})
+  cmake_parse_arguments(arg "INTERNAL;APART" "DOOR" "SOURCES;PUBLIC;PRIVATE;HEADERS" ${ARGN})
   add_library(lensforge_${name} STATIC ${arg_SOURCES})
   add_library(lensforge::${name} ALIAS lensforge_${name})
   target_compile_features(lensforge_${name} PUBLIC cxx_std_20)
@@ -70,6 +71,9 @@ function(lensforge_room name folder)
     target_precompile_headers(lensforge_${name} PRIVATE ${LENSFORGE_COMMON_HEADERS} ${arg_HEADERS})
   else()
     lensforge_precompile(lensforge_${name} lensforge_common_headers)
+  endif()
+  if(NOT arg_APART)
+    lensforge_unite(lensforge_${name})
   endif()
   if(NOT arg_INTERNAL)
     lensforge_install(lensforge_${name} ${name})

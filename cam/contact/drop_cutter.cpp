@@ -167,7 +167,7 @@ constexpr double kCellPerTriangle = 1.001;
 /// Maximum cells of a grid per triangle; beyond it cells grow, which bounds memory.
 constexpr double kCellsPerTriangle = 4.0;
 
-Eigen::AlignedBox3d box_of(const SurfaceMesh& mesh, std::int64_t triangle) {
+Eigen::AlignedBox3d bounds_of(const SurfaceMesh& mesh, std::int64_t triangle) {
   Eigen::AlignedBox3d box(mesh.corner(triangle, 0));
   box.extend(mesh.corner(triangle, 1));
   box.extend(mesh.corner(triangle, 2));
@@ -379,7 +379,7 @@ DropCutter::DropCutter(const SurfaceMesh& mesh, double radius, const Executor& e
   if (count == 0) return;
   std::vector<double> extents(index_of(count));
   for (std::int64_t t = 0; t < count; ++t) {
-    const Eigen::AlignedBox3d box = box_of(mesh, t);
+    const Eigen::AlignedBox3d box = bounds_of(mesh, t);
     bounds_.extend(box);
     extents[index_of(t)] = extent(box);
   }
@@ -415,7 +415,7 @@ void DropCutter::sort_into_cells(const SurfaceMesh& mesh, const std::vector<doub
     while (levels_[l].cell < extents[t]) ++l;
     Level& level = levels_[l];
     const Eigen::Vector3d centre =
-        box_of(mesh, static_cast<std::int64_t>(t)).center() - bounds_.min();
+        bounds_of(mesh, static_cast<std::int64_t>(t)).center() - bounds_.min();
     const auto column = std::min(static_cast<int>(centre.x() / level.cell), level.columns - 1);
     const auto row = std::min(static_cast<int>(centre.y() / level.cell), level.rows - 1);
     const std::size_t cell = index_of(row) * index_of(level.columns) + index_of(column);

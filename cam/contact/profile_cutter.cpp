@@ -199,7 +199,7 @@ double profile_box_tip(const CutterProfile& profile, const Eigen::Vector2d& p,
 namespace {
 
 /// Cells per triangle: with two triangles per cell the pyramid is as small as the items.
-constexpr double kCellsPerTriangle = 0.5;
+constexpr double kPyramidCells = 0.5;
 
 }  // namespace
 
@@ -236,7 +236,7 @@ ProfileCutter::ProfileCutter(const SurfaceMesh& mesh) {
     for (int k = 0; k < 3; ++k) bounds_.extend(mesh.corner(t, k));
   }
   const Eigen::Vector2d size = bounds_.sizes().head<2>();
-  const double cells = kCellsPerTriangle * static_cast<double>(count) + 1.0;
+  const double cells = kPyramidCells * static_cast<double>(count) + 1.0;
   const double cell = std::max(std::sqrt(size.prod() / cells), size.maxCoeff() / cells);
   sort_into_cells(mesh, cell > 0.0 ? cell : 1.0);
   build_pyramid();

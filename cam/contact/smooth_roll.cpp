@@ -15,7 +15,7 @@ namespace lensforge {
 namespace {
 
 /// Maximum number of cells: 64 MB.
-constexpr double kMaxCells = 4e6;
+constexpr double kMaxRollCells = 4e6;
 
 /// Cells of one level along the side of one of the next.
 constexpr std::int64_t kCoarser = 4;
@@ -35,7 +35,7 @@ void BoundsMap::Cell::extend(const Cell& other) {
 BoundsMap::BoundsMap(const OpticalSurface& surface, std::span<const SurfaceBounds> bounds,
                      double cell)
     : box_(surface.box()) {
-  Level fine = make_level(std::max(cell, std::sqrt(box_.volume() / kMaxCells)));
+  Level fine = make_level(std::max(cell, std::sqrt(box_.volume() / kMaxRollCells)));
   const SurfaceMesh& mesh = surface.mesh();
   for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
     Eigen::AlignedBox2d box;
@@ -113,17 +113,17 @@ namespace {
 constexpr double kFlat = 1e-5;
 
 /// Maximum number of steps; two are usual.
-constexpr int kMaxSteps = 40;
+constexpr int kMaxRollSteps = 40;
 
 /// Maximum distance of contacts from the axis, in radii.
 constexpr double kFarthest = 0.98;
 
 /// Curvature bounds are stored per cell. Maximum cell size, in ball radii and in mm.
-constexpr double kCellPerRadius = 0.25;
+constexpr double kRollCellPerRadius = 0.25;
 constexpr double kLargestCell = 0.1;
 
 /// Footprints are enlarged by this, mm: rounding.
-constexpr double kMargin = 1e-6;
+constexpr double kRollMargin = 1e-6;
 
 /// Maximum number of steps that narrow a footprint, and the share of it that must remain after a
 /// step for it to be the last.
@@ -169,7 +169,7 @@ SmoothBed::SmoothBed(const OpticalSurface& surface, double radius,
                      std::span<const SurfaceBounds> bounds)
     : surface_(surface),
       radius_(radius),
-      bounds_(surface, bounds, std::min(kCellPerRadius * radius, kLargestCell)) {}
+      bounds_(surface, bounds, std::min(kRollCellPerRadius * radius, kLargestCell)) {}
 
 /// Closer places rise less, and a smaller rise brings the contact closer.
 double SmoothBed::reach(const Eigen::AlignedBox2d& axis) const {
@@ -178,7 +178,7 @@ double SmoothBed::reach(const Eigen::AlignedBox2d& axis) const {
   double reach = radius_;
   for (int i = 0; i < kReachSteps; ++i) {
     const double rise = bounds_.roughly_over(grown(over, reach)).highest - lowest;
-    const double next = std::sqrt(2.0 * radius_ * std::max(rise, 0.0)) + kMargin;
+    const double next = std::sqrt(2.0 * radius_ * std::max(rise, 0.0)) + kRollMargin;
     const bool last = next > kReachGain * reach;
     reach = std::min(next, reach);
     if (last) break;
@@ -192,7 +192,8 @@ Eigen::AlignedBox2d SmoothBed::footprint(const Eigen::AlignedBox2d& axis) const 
 
 Eigen::AlignedBox2d SmoothBed::footprint(const Eigen::AlignedBox2d& axis, double tip) const {
   const auto holds = [&](const Eigen::AlignedBox2d& cell, const SurfaceBounds& bounds) {
-    return bounds.highest + kMargin - tip >= axis.squaredExteriorDistance(cell) / (2.0 * radius_);
+    return bounds.highest + kRollMargin - tip >=
+           axis.squaredExteriorDistance(cell) / (2.0 * radius_);
   };
   return bounds_.part_where(footprint(axis), holds);
 }
@@ -222,7 +223,7 @@ std::optional<SmoothRoll::Rest> SmoothRoll::rest_at(double u, const Eigen::Vecto
   Eigen::Vector2d q = nearest_inside(box, guess);
   Eigen::Vector2d before = nearest_inside(box, p);
   double height = -HUGE_VAL;
-  for (int step = 0; step < kMaxSteps; ++step) {
+  for (int step = 0; step < kMaxRollSteps; ++step) {
     const Eigen::Vector2d d = q - p;
     const double s2 = radius * radius - d.squaredNorm();
     if (!(d.norm() < kFarthest * radius)) {

@@ -55,14 +55,14 @@ constexpr double kFlatPitch = 1.0;
 constexpr double kFlatPasses = 150.0;  ///< The default coupon's 135 take 1.4 of its 5.7 minutes.
 constexpr double kFlatLeast = 3.0;     ///< mm across; a laser's spot is 1 to 2 mm wide.
 
-constexpr double kMargin = 2.0;     ///< mm from the blank's border to the first cut.
+constexpr double kBorder = 2.0;     ///< mm from the blank's border to the first cut.
 constexpr double kGap = 1.0;        ///< mm of untouched top between cuts.
 constexpr double kPadAlong = 4.0;   ///< mm; a laser's spot is 1 to 2 mm wide.
 constexpr double kPadAcross = 6.0;  ///< mm; a roughness tester's stroke is 4.8 mm (ISO 4288).
-constexpr double kMicrometre = 1e-3;
+constexpr double kLayoutStep = 1e-3;
 constexpr double kMarkDepth = 0.5;  ///< Of the deepest groove.
 
-double to_micrometre(double mm) { return std::round(mm / kMicrometre) * kMicrometre; }
+double to_micrometre(double mm) { return std::round(mm / kLayoutStep) * kLayoutStep; }
 
 /// Places one thing after the other across the passes.
 class Across {
@@ -82,7 +82,7 @@ class Across {
 /// @param pitch  at least; rounded. @param wide  across, at least.
 CouponPad pad_at(double along, double across, double pitch, double wide) {
   CouponPad pad;
-  pad.pitch = std::max(kMicrometre, to_micrometre(pitch));
+  pad.pitch = std::max(kLayoutStep, to_micrometre(pitch));
   const double passes = std::ceil(wide / pad.pitch);
   pad.box.min() = {along, across};
   pad.box.max() = {along + kPadAlong, across + passes * pad.pitch};
@@ -117,7 +117,7 @@ void check(const CouponLayout& layout, const CouponOptions& options, double need
   if (layout.pad_depth < 2.0 * highest) {
     refuse("--depth", layout.pad_depth,
            "must be at least " +
-               trimmed_decimal(std::ceil(2.0 * highest / kMicrometre) * kMicrometre, 3) +
+               trimmed_decimal(std::ceil(2.0 * highest / kLayoutStep) * kLayoutStep, 3) +
                " mm, twice the height of the highest scallops");
   }
   const Tool& ball = options.workshop.tool(options.workshop.process.finish.tool);
@@ -159,7 +159,7 @@ CouponLayout coupon_layout(const CouponOptions& options) {
   const double unit = std::min(sigma, kWidestPitch / kPitches.back() * radius);
   const double groove_unit =
       std::min(radius, kDeepestGroove / *std::max_element(kDepths.begin(), kDepths.end()));
-  const double begin = kMargin + 2.0 * radius;  // A pad's passes turn a diameter beyond it.
+  const double begin = kBorder + 2.0 * radius;  // A pad's passes turn a diameter beyond it.
   const double gap = kGap + 2.0 * radius;       // A groove is a diameter wide at most.
   const double pad_gap = kGap + 4.0 * radius;
 

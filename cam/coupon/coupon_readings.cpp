@@ -130,8 +130,8 @@ double CouponState::haze_ratio(const HazePlace& place, const CouponLight& light)
 
 namespace {
 
-constexpr double kMicrometre = 1e-3;  ///< mm
-constexpr double kNanometre = 1e-6;   ///< mm
+constexpr double kMmPerMicrometre = 1e-3;  ///< mm
+constexpr double kNanometre = 1e-6;        ///< mm
 
 // Uncertainties that the template states: calliper's points in grooves, measuring microscope,
 // roughness tester (ISO 12179 calibrates to some per cent), light meter of a phone or photodiode.
@@ -170,9 +170,9 @@ struct ReadingKeys {
 };
 
 const ReadingKeys kDistance{"distance_mm", "distance_uncertainty_mm", 1.0, 1.0, 1000.0};
-const ReadingKeys kWidth{"width_mm", "width_uncertainty_mm", 1.0, 1e-3, 10.0};
-const ReadingKeys kBefore{"before_um", "before_uncertainty_um", kMicrometre, 1e-3, 1000.0};
-const ReadingKeys kAfter{"after_um", "after_uncertainty_um", kMicrometre, 1e-3, 1000.0};
+const ReadingKeys kGrooveWidth{"width_mm", "width_uncertainty_mm", 1.0, 1e-3, 10.0};
+const ReadingKeys kBefore{"before_um", "before_uncertainty_um", kMmPerMicrometre, 1e-3, 1000.0};
+const ReadingKeys kAfter{"after_um", "after_uncertainty_um", kMmPerMicrometre, 1e-3, 1000.0};
 const ReadingKeys kOrders{"order_ratio", "order_ratio_uncertainty", 1.0, 1e-6, 1e3};
 const ReadingKeys kHaze{"light_ratio", "light_ratio_uncertainty", 1.0, 1e-12, 1.0};
 
@@ -236,7 +236,7 @@ MarkReadings read_mark(TomlFields& fields) {
 }
 
 GrooveReadings read_groove(TomlFields& fields) {
-  return {fields.number("depth_mm", {1e-4, 10.0}), read(fields, kWidth)};
+  return {fields.number("depth_mm", {1e-4, 10.0}), read(fields, kGrooveWidth)};
 }
 
 PadReadings read_pad(TomlFields& fields) {
@@ -364,7 +364,7 @@ std::string readings_template(const CouponReadings& expected) {
     file.text("\n# " + feature_name('G', i) +
               ": width at the top, before polishing.\n[[groove]]\n");
     file.number("depth_mm", expected.grooves[i].depth);
-    file.reading(kWidth, expected.grooves[i].width);
+    file.reading(kGrooveWidth, expected.grooves[i].width);
   }
   for (std::size_t i = 0; i < expected.pads.size(); ++i) {
     file.text("\n# " + feature_name('P', i) +

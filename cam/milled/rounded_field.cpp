@@ -78,10 +78,10 @@ bool FacetReach::surely_free(std::int32_t facet, const Eigen::Vector3d& centre) 
 namespace {
 
 /// Side of the cells, in radii.
-constexpr double kCellPerRadius = 0.25;
+constexpr double kIndexCellPerRadius = 0.25;
 
 /// Maximum number of cells: 16 MB.
-constexpr double kMaxCells = 1.6e7;
+constexpr double kMaxIndexCells = 1.6e7;
 
 /// Boxes exceed cells by this, mm: rounding of a centre's cell.
 constexpr double kMargin = 1e-6;
@@ -91,7 +91,7 @@ constexpr double kMargin = 1e-6;
 SmoothReach::SmoothReach(const SmoothBed& bed, const Executor& executor)
     : box_(bed.surface().box()) {
   const double radius = bed.radius();
-  cell_ = std::max(kCellPerRadius * radius, std::sqrt(box_.volume() / kMaxCells));
+  cell_ = std::max(kIndexCellPerRadius * radius, std::sqrt(box_.volume() / kMaxIndexCells));
   columns_ = static_cast<std::int64_t>(box_.sizes().x() / cell_) + 1;
   rows_ = static_cast<std::int64_t>(box_.sizes().y() / cell_) + 1;
   free_.resize(static_cast<std::size_t>(columns_ * rows_));

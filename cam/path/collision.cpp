@@ -15,9 +15,6 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// Height of material that cells of the stock map may show where there is none, mm.
-constexpr double kThinMaterial = 0.01;
-
 /// Depth by which a path may sink below surface and ramp, mm: passes are above the floor by at most
 /// its slope times their spacing (PassGrid), which is less on slopes up to 0.9 with the default
 /// spacing.

@@ -74,7 +74,7 @@ OutlineWay offset_outline(const std::vector<Eigen::Vector2d>& polygon, double ra
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 
 /// Starting points tried for the tabs, in one interval between tabs.
@@ -114,7 +114,7 @@ class Loop {
   std::vector<double> at_;
 };
 
-double ramp_slope(const OutlineCut& cut) { return std::tan(cut.ramp_angle_deg * kDegree); }
+double ramp_slope(const OutlineCut& cut) { return std::tan(cut.ramp_angle_deg * kRadPerDegree); }
 
 /// Heights of the tool over the tabs and on the ramps behind them.
 class Tabs {

@@ -217,10 +217,6 @@ TipPath PassGrid::chords(std::int64_t pass, std::int64_t begin, std::int64_t end
 
 namespace {
 
-/// Maximum thickness of material entered without a ramp, mm: a cell of the stock map, an upper
-/// bound, may show as much where there is none.
-constexpr double kThinMaterial = 0.01;
-
 /// Maximum slope of the floor on a helix's circle: lenses have no more. Over a rim or beside a
 /// clamp, where it is steeper, another circle or a ramp is used.
 constexpr double kSteepestHelix = 0.5;

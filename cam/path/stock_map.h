@@ -14,6 +14,9 @@
 
 namespace lensforge {
 
+/// Height of material that cells of a StockMap, upper bounds, may show where there is none, mm.
+inline constexpr double kThinMaterial = 0.01;
+
 /// Result of a cut of a StockMap.
 struct StockCut {
   /// Maximum height of the material above the cutter's silhouette, mm, and the tip there: the depth

@@ -13,11 +13,11 @@ namespace lensforge {
 namespace {
 
 constexpr std::int64_t kLinesBetweenReports = 1 << 14;
-constexpr double kReferenceZ = 100.0;  ///< mm
+constexpr double kStartReferenceZ = 100.0;  ///< mm
 
 GcodeState start_state() {
   GcodeState state;
-  state.g28 = state.g30 = Eigen::Vector3d(0.0, 0.0, kReferenceZ);
+  state.g28 = state.g30 = Eigen::Vector3d(0.0, 0.0, kStartReferenceZ);
   return state;
 }
 

@@ -161,7 +161,7 @@ std::vector<AxisFilters> polish_filters(const PolishTransfer& transfer, const Li
 
 namespace {
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kTurn = 2.0 * std::numbers::pi;
 
 constexpr int kProfile = 96;    ///< Sampled places of a scallop's period.
 constexpr int kHarmonics = 32;  ///< Used; without polish the last has 0.1 % of the first's height.
@@ -194,7 +194,7 @@ std::array<double, kHarmonics> harmonics(const std::array<double, kProfile>& hei
     double sum = 0.0;
     for (int i = 0; i < kProfile; ++i) {
       const double t = (i + 0.5) / kProfile - 0.5;
-      sum += height[static_cast<std::size_t>(i)] * std::cos(kTwoPi * k * t);
+      sum += height[static_cast<std::size_t>(i)] * std::cos(kTurn * k * t);
     }
     coefficients[static_cast<std::size_t>(k - 1)] = 2.0 * sum / kProfile;
   }
@@ -211,9 +211,9 @@ Ripple::Ripple(const Passes& passes, double radius, const PolishTransfer& polish
   for (std::size_t i = 0; i < kSlopePlaces; ++i) {
     double slope = 0.0;
     for (int k = 1; k <= kHarmonics; ++k) {
-      const double wave = kTwoPi * k / passes.pitch;
+      const double wave = kTurn * k / passes.pitch;
       slope -= coefficients[static_cast<std::size_t>(k - 1)] * polish_.at(wave) * wave *
-               std::sin(kTwoPi * k * static_cast<double>(i) / kSlopePlaces);
+               std::sin(kTurn * k * static_cast<double>(i) / kSlopePlaces);
     }
     slope_.push_back(slope);
     largest_ = std::max(largest_, std::abs(slope));
@@ -234,12 +234,12 @@ double Ripple::slope(double place, const Eigen::Vector2d& surface, int across) c
 
 double Ripple::seen_by_disc(double radius) const {
   constexpr double kSmall = 1e-4;  // Below, the series' x²/8 is 1e-9.
-  const double x = kTwoPi * radius / pitch_;
+  const double x = kTurn * radius / pitch_;
   return x < kSmall ? 1.0 : 2.0 * std::cyl_bessel_j(1.0, x) / x;
 }
 
 double Ripple::kept(double factor) const {
-  const double wave = kTwoPi / pitch_;
+  const double wave = kTurn / pitch_;
   if (polish_.floor > 0.0) return polish_.at(factor * wave) / polish_.at(wave);
   const double t = wave * polish_.sigma;
   if (polish_.order == kFilmOrder) {
@@ -607,7 +607,7 @@ void PartTile::deposit(const FluxAccumulator& image) const {
 }
 
 /// Cells of a tile: its buffers, 1 MB, fit a core's cache, and an interrupt waits for two.
-constexpr std::int64_t kTile = 96;
+constexpr std::int64_t kModelTile = 96;
 
 std::array<BaseAxis, 2> axes_of(const PartPlan& plan) {
   const Eigen::Vector2d& size = plan.optics.lens_size;
@@ -679,7 +679,7 @@ FluxRaster render_tiles(const PartScene& scene, const Eigen::Vector2i& pixels,
   FluxImage image(static_cast<int>(raster.columns), static_cast<int>(raster.rows));
   image.begin(executor);
   const std::vector<CellRange> tiles =
-      tiles_of({0, 0, scene.base.axis(0).nodes - 1, scene.base.axis(1).nodes - 1}, kTile);
+      tiles_of({0, 0, scene.base.axis(0).nodes - 1, scene.base.axis(1).nodes - 1}, kModelTile);
   const auto add_tile = [&](std::int64_t t, const FluxAccumulator& sum) {
     PartTile(scene, tiles[static_cast<std::size_t>(t)]).deposit(sum);
   };

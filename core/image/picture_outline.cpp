@@ -119,11 +119,11 @@ PictureOutline heif_outline(const Head& head) {
 
 /// OpenEXR file layout: the reader allocates tables by the height of the data window.
 PictureOutline exr_outline(const Head& head) {
-  constexpr std::string_view kWindow("dataWindow\0box2i\0\x10\0\0\0", 21);
+  constexpr std::string_view kDataWindow("dataWindow\0box2i\0\x10\0\0\0", 21);
   PictureOutline exr{"openexr", 0, 0, false, {}};
-  for (std::size_t at = head.view().find(kWindow); at != std::string_view::npos;
-       at = head.view().find(kWindow, at + 1)) {
-    const std::size_t box = at + kWindow.size();
+  for (std::size_t at = head.view().find(kDataWindow); at != std::string_view::npos;
+       at = head.view().find(kDataWindow, at + 1)) {
+    const std::size_t box = at + kDataWindow.size();
     exr.columns = std::max(exr.columns, head.little_signed(box + 8) - head.little_signed(box) + 1);
     exr.rows = std::max(exr.rows, head.little_signed(box + 12) - head.little_signed(box + 4) + 1);
   }

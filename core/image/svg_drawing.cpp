@@ -50,15 +50,7 @@ constexpr std::size_t kHeadBytes = std::size_t{64} << 10U;
 constexpr unsigned kMaxThreads = 4;
 
 /// Maximum bytes of a library's message, which may quote the file.
-constexpr std::size_t kLongestReason = 200;
-
-template <auto kFree>
-struct Free {
-  template <class T>
-  void operator()(T* thing) const {
-    kFree(thing);
-  }
-};
+constexpr std::size_t kLongestMessage = 200;
 
 template <class T>
 using Object = std::unique_ptr<T, Free<g_object_unref>>;
@@ -81,7 +73,7 @@ class Failure {
     const std::size_t numbers = text.find(": Error domain ");
     const std::size_t place = text.find(" on line ", numbers);
     if (place != std::string::npos) text.erase(numbers, place - numbers);
-    return ": " + printable_line(text, kLongestReason);
+    return ": " + printable_line(text, kLongestMessage);
   }
 
  private:

@@ -24,15 +24,7 @@ namespace lensforge {
 namespace {
 
 /// Maximum bytes of a file's name in a message.
-constexpr std::size_t kLongestName = 60;
-
-template <auto kFree>
-struct Free {
-  template <class T>
-  void operator()(T* thing) const {
-    kFree(thing);
-  }
-};
+constexpr std::size_t kLongestQuote = 60;
 
 /// White space and quotes.
 constexpr std::string_view kAround = " \t\r\n\"'";
@@ -277,8 +269,8 @@ std::string remark_on(const std::vector<std::string>& families) {
     if (!drawn) drawn = found;
   }
   if (families.empty()) return {};
-  return "text is drawn in the font '" + printable_line(drawn.value_or("none"), kLongestName) +
-         "' because '" + printable_line(families.front(), kLongestName) +
+  return "text is drawn in the font '" + printable_line(drawn.value_or("none"), kLongestQuote) +
+         "' because '" + printable_line(families.front(), kLongestQuote) +
          "' is not installed: install it, or convert the text to paths";
 }
 
@@ -506,7 +498,7 @@ class Survey {
     } else if (svg && std::find(drawn.begin(), drawn.end(), name) != drawn.end()) {
       return true;
     } else if (is_new(name)) {
-      leave_out("an element that SVG does not have ('" + printable_line(name, kLongestName) + "')",
+      leave_out("an element that SVG does not have ('" + printable_line(name, kLongestQuote) + "')",
                 "draw it with SVG's shapes and text");
     }
     return false;
@@ -613,8 +605,9 @@ class Survey {
   void look_at_link(const std::string& link) {
     if (link.empty() || link.starts_with('#') || lower_case(link.substr(0, 5)) == "data:") return;
     if (!is_new(link)) return;
-    leave_out(std::string("'") + printable_line(link, kLongestName) + "', which is not in the file",
-              "embed it");
+    leave_out(
+        std::string("'") + printable_line(link, kLongestQuote) + "', which is not in the file",
+        "embed it");
   }
 
   void look_at_picture() {

@@ -348,7 +348,7 @@ const char* advice_for(const std::array<Advice, kCount>& table, std::string_view
   return found == table.end() ? nullptr : found->words;
 }
 
-constexpr std::string_view kAround = " \t\r\n;";
+constexpr std::string_view kAroundRule = " \t\r\n;";
 
 std::string in_quotes(std::string_view text) {
   std::string quoted = "'";
@@ -423,8 +423,8 @@ void SvgLogReader::add(const std::string& kind, const std::string& finding) {
 }
 
 void SvgLogReader::take_value(std::string_view name, std::string_view value) {
-  name = trimmed(name, kAround);
-  value = trimmed(value, kAround);
+  name = trimmed(name, kAroundRule);
+  value = trimmed(value, kAroundRule);
   if (value.empty() || !std::all_of(name.begin(), name.end(), in_name)) return;
   if (is_list_of_places(name, value)) return;
   const std::string mark = mark_of(value);
@@ -446,7 +446,7 @@ void SvgLogReader::take_declaration(std::string_view declaration) {
 }
 
 void SvgLogReader::take_rule(std::string_view error, std::string_view rule) {
-  rule = trimmed(rule.substr(0, rule.find('{')), kAround);
+  rule = trimmed(rule.substr(0, rule.find('{')), kAroundRule);
   const std::string_view at = between(error, "AtRuleInvalid(\"", "\"");
   if (at == "font-face") {
     return add("font",

@@ -12,6 +12,15 @@
 
 namespace lensforge {
 
+/// Deleter for what a C library has made, by that library's function.
+template <auto kFree>
+struct Free {
+  template <class T>
+  void operator()(T* thing) const {
+    kFree(thing);
+  }
+};
+
 /// An SVG feature that librsvg does not draw.
 struct UndrawnThing {
   std::string_view name;  ///< Name of the element, attribute or property.

@@ -517,7 +517,7 @@ namespace {
 // size decides; if the size does not match, a zero byte, which text never contains.
 
 constexpr std::size_t kStlHeadBytes = 84;
-constexpr std::size_t kStlTriangleBytes = 50;
+constexpr std::size_t kStlRecordBytes = 50;
 
 using Point = std::array<float, 3>;
 
@@ -564,12 +564,12 @@ std::uint32_t triangles_announced(std::string_view content) {
 }
 
 std::size_t binary_size(std::string_view content) {
-  return kStlHeadBytes + kStlTriangleBytes * std::size_t{triangles_announced(content)};
+  return kStlHeadBytes + kStlRecordBytes * std::size_t{triangles_announced(content)};
 }
 
 SurfaceMesh read_binary(std::string_view content) {
   CornerMerger merger;
-  for (std::size_t at = kStlHeadBytes; at < content.size(); at += kStlTriangleBytes) {
+  for (std::size_t at = kStlHeadBytes; at < content.size(); at += kStlRecordBytes) {
     std::array<Point, 3> corners{};
     std::memcpy(&corners, content.data() + at + sizeof(Point), sizeof corners);  // Past the normal.
     merger.add_triangle(corners);

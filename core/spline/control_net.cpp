@@ -183,7 +183,6 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "splines are little-endian");
 
 constexpr std::string_view kMagic = "lensforge spline 1\n";
-constexpr int kDegree = 3;
 /// Maximum file size: 178 million control points.
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{4} << 30U;
 
@@ -193,12 +192,12 @@ constexpr std::uintmax_t kMaxBytes = std::uintmax_t{4} << 30U;
 
 GridShape read_shape(const JsonFields& header) {
   if (header.text("units") != "mm") header.refuse("units", "only \"mm\" can be read");
-  if (header.integer("degree") != kDegree) header.refuse("degree", "only 3 can be read");
+  if (header.integer("degree") != kSplineDegree) header.refuse("degree", "only 3 can be read");
   if (header.text("knots") != "uniform, clamped") {
     header.refuse("knots", "only \"uniform, clamped\" can be read");
   }
   const Eigen::Vector2i count = header.integer_pair("control_points");
-  if (count.minCoeff() <= kDegree) header.refuse("control_points", "at least 4 each way");
+  if (count.minCoeff() <= kSplineDegree) header.refuse("control_points", "at least 4 each way");
   return {count.x(), count.y()};
 }
 
@@ -206,7 +205,7 @@ GridShape read_shape(const JsonFields& header) {
 
 void write_spline(const ControlNet& net, const std::filesystem::path& path) {
   const nlohmann::ordered_json header = {{"units", "mm"},
-                                         {"degree", kDegree},
+                                         {"degree", kSplineDegree},
                                          {"knots", "uniform, clamped"},
                                          {"control_points", {net.shape.columns, net.shape.rows}}};
   std::string content(kMagic);

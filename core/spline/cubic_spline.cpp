@@ -7,10 +7,8 @@
 namespace lensforge {
 namespace {
 
-constexpr int kDegree = 3;
-
 /// Knot i of the fourfold-ended knot vector over [0, cells].
-double knot(int i, int cells) { return std::clamp(i - kDegree, 0, cells); }
+double knot(int i, int cells) { return std::clamp(i - kSplineDegree, 0, cells); }
 
 int cell_of(double t, int cells) {
   return std::clamp(static_cast<int>(std::floor(t)), 0, cells - 1);
@@ -19,7 +17,7 @@ int cell_of(double t, int cells) {
 /// Values of the basis functions of one degree that are not zero in a cell (Cox–de Boor).
 std::array<double, 4> functions(double t, int cell, int cells, int degree) {
   std::array<double, 4> n{1.0};
-  const int span = cell + kDegree;
+  const int span = cell + kSplineDegree;
   for (int p = 1; p <= degree; ++p) {
     double saved = 0.0;
     for (int r = 0; r < p; ++r) {
@@ -40,7 +38,7 @@ std::array<double, 4> functions(double t, int cell, int cells, int degree) {
 std::array<double, 4> differences(const std::array<double, 4>& lower, int cell, int cells,
                                   int degree) {
   std::array<double, 4> result{};
-  const int first = cell + kDegree - degree;
+  const int first = cell + kSplineDegree - degree;
   for (int j = 0; j < degree; ++j) {
     const double width = knot(first + j + 1 + degree, cells) - knot(first + j + 1, cells);
     const auto i = static_cast<std::size_t>(j);
@@ -53,13 +51,13 @@ std::array<double, 4> differences(const std::array<double, 4>& lower, int cell, 
 
 /// Coefficient of a part of the spline: the blossom of the piece over `cell` at three of its knots.
 double blossom(const Eigen::VectorXd& coefficients, int cell, const std::array<double, 3>& at) {
-  const auto cells = static_cast<int>(coefficients.size()) - kDegree;
+  const auto cells = static_cast<int>(coefficients.size()) - kSplineDegree;
   std::array<double, 4> d{};
   for (int j = 0; j < 4; ++j) d[static_cast<std::size_t>(j)] = coefficients[cell + j];
-  for (int r = 1; r <= kDegree; ++r) {
-    for (int j = kDegree; j >= r; --j) {
+  for (int r = 1; r <= kSplineDegree; ++r) {
+    for (int j = kSplineDegree; j >= r; --j) {
       const double left = knot(cell + j, cells);
-      const double right = knot(cell + j + kDegree + 1 - r, cells);
+      const double right = knot(cell + j + kSplineDegree + 1 - r, cells);
       const double share = (at[static_cast<std::size_t>(r - 1)] - left) / (right - left);
       const auto i = static_cast<std::size_t>(j);
       d[i] = (1.0 - share) * d[i - 1] + share * d[i];
@@ -85,10 +83,10 @@ CubicBasis inner_basis(double t, int cell) {
 
 CubicBasis cubic_basis(double t, int cells) {
   const int cell = cell_of(t, cells);
-  if (cell >= kDegree - 1 && cell + kDegree <= cells) return inner_basis(t, cell);
+  if (cell >= kSplineDegree - 1 && cell + kSplineDegree <= cells) return inner_basis(t, cell);
   CubicBasis basis;
   basis.first = cell;
-  basis.value = functions(t, basis.first, cells, kDegree);
+  basis.value = functions(t, basis.first, cells, kSplineDegree);
   basis.slope = differences(functions(t, basis.first, cells, 2), basis.first, cells, 3);
   basis.bend = differences(differences(functions(t, basis.first, cells, 1), basis.first, cells, 2),
                            basis.first, cells, 3);
@@ -102,7 +100,7 @@ double greville_point(int i, int cells) {
 Eigen::SparseMatrix<double, Eigen::RowMajor> basis_matrix(const std::vector<double>& points,
                                                           int cells, bool slopes) {
   Eigen::SparseMatrix<double, Eigen::RowMajor> matrix(static_cast<Eigen::Index>(points.size()),
-                                                      cells + kDegree);
+                                                      cells + kSplineDegree);
   matrix.reserve(Eigen::VectorXi::Constant(matrix.rows(), 4));
   for (std::size_t row = 0; row < points.size(); ++row) {
     const CubicBasis basis = cubic_basis(points[row], cells);
@@ -118,9 +116,9 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> basis_matrix(const std::vector<doub
 
 Eigen::MatrixXd restriction(int cells, int from, int to) {
   const int count = to - from;
-  Eigen::MatrixXd matrix(count + kDegree, count + kDegree);
+  Eigen::MatrixXd matrix(count + kSplineDegree, count + kSplineDegree);
   for (int k = 0; k < matrix.cols(); ++k) {
-    Eigen::VectorXd unit = Eigen::VectorXd::Zero(cells + kDegree);
+    Eigen::VectorXd unit = Eigen::VectorXd::Zero(cells + kSplineDegree);
     unit[from + k] = 1.0;
     for (int i = 0; i < matrix.rows(); ++i) {
       const std::array<double, 3> at{from + knot(i + 1, count), from + knot(i + 2, count),

@@ -10,6 +10,7 @@ namespace lensforge {
 
 // Cubic B-splines over [0, cells] with a knot at every whole number, fourfold at both ends: cells
 // + 3 coefficients; the ends' values are the first and last one.
+inline constexpr int kSplineDegree = 3;
 
 /// The four basis functions that are not zero at a point: numbers first … first + 3.
 struct CubicBasis {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <complex>
 #include <cstdint>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
@@ -33,7 +32,6 @@ using std::numbers::pi;
 
 constexpr double kTubesPerWavelength = 10.0;
 constexpr int kBounces = 3;
-constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 
 /// A pseudo-random number in 0 … 1 for a counter (SplitMix64).
 double jitter(std::uint64_t counter) { return unit_share(mixed_bits(counter * kGoldenGamma)); }
@@ -90,7 +88,7 @@ class OneBounce {
     int seen = 0;
     for (const Vector3d& p : {middle, Vector3d(0.5 * (middle + c.v0)),
                               Vector3d(0.5 * (middle + c.v1)), Vector3d(0.5 * (middle + c.v2))}) {
-      seen += scene_.blocked(scene_.lifted(p, n), towards_, kAnywhere) ? 0 : 1;
+      seen += scene_.blocked(scene_.lifted(p, n), towards_, RayScene::kAnywhere) ? 0 : 1;
     }
     return 0.25 * seen;
   }
@@ -149,7 +147,7 @@ class Aperture {
       path += hit.distance;
       p = scene_.lifted(p + hit.distance * d, n);
       const bool back = n.dot(towards_) > 0.0;
-      if (bounce > 0 && back && !scene_.blocked(p, towards_, kAnywhere)) {
+      if (bounce > 0 && back && !scene_.blocked(p, towards_, RayScene::kAnywhere)) {
         const double factor = 0.5 * sign * (1.0 - n.dot(towards_) / n.dot(d));
         sum += std::polar(factor, wave_number_ * (path - towards_.dot(p - middle_)));
       }

@@ -389,8 +389,6 @@ Energies evaluate(const SurfaceMesh& mesh, const ReflectOptions& options,
 
 namespace {
 
-using nlohmann::json;
-
 /// After the header come the vertices and the unmet turns, as doubles.
 constexpr std::string_view kMagic = "lensforge reflect checkpoint 1\n";
 
@@ -437,7 +435,7 @@ void describe(Description& d, ReflectCheckpoint& checkpoint) {
 }
 
 std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOptions& options) {
-  json description = {input.fixed, input.planar, input.partner};
+  nlohmann::json description = {input.fixed, input.planar, input.partner};
   append_fingerprint(description_of(options), description);
   Fnv1a hash;
   hash.add(description.dump());
@@ -447,9 +445,9 @@ std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOption
 }
 
 void write_checkpoint(const ReflectCheckpoint& checkpoint, const std::filesystem::path& path) {
-  json rows = json::array();
+  nlohmann::json rows = nlohmann::json::array();
   for (const ReflectUpdate& row : checkpoint.updates) rows.push_back(row_of(description_of(row)));
-  json header = json_of(description_of(checkpoint));
+  nlohmann::json header = json_of(description_of(checkpoint));
   header.update({{"fingerprint", checkpoint.fingerprint},
                  {"split", checkpoint.split},
                  {"updates", rows},
@@ -469,7 +467,7 @@ ReflectCheckpoint read_checkpoint(const std::filesystem::path& path,
     read_json(description_of(checkpoint), fields);
     checkpoint.fingerprint = content.header.at("fingerprint");
     checkpoint.split = content.header.at("split").get<std::vector<int>>();
-    for (const json& row : content.header.at("updates")) {
+    for (const nlohmann::json& row : content.header.at("updates")) {
       read_row(description_of(checkpoint.updates.emplace_back()), row);
     }
     if (checkpoint.first < 0 || checkpoint.first > static_cast<int>(checkpoint.updates.size())) {
@@ -485,7 +483,7 @@ ReflectCheckpoint read_checkpoint(const std::filesystem::path& path,
     checkpoint.unmet = taken(numbers, fields.integer("faces"), path);
     if (!numbers.empty()) refuse_checkpoint(path, "holds more numbers than its header says");
     return checkpoint;
-  } catch (const json::exception&) {
+  } catch (const nlohmann::json::exception&) {
     refuse_checkpoint(path, "has a bad header: a field is missing or of another type");
   }
 }

@@ -370,7 +370,7 @@ TransportResult solve_semi_discrete(const Eigen::Matrix2Xd& sites, const Eigen::
 namespace {
 
 /// Number of buckets searched to each side of a point's own.
-constexpr int kReach = 2;
+constexpr int kBucketReach = 2;
 
 /// Distance between the points at which a segment is checked for black, pixels.
 constexpr double kLook = 0.5;
@@ -419,10 +419,11 @@ std::size_t BrenierMap::bucket(int column, int row) const {
 std::vector<int> BrenierMap::around(const Eigen::Vector2d& p) const {
   const int column = bucket_of(p.x(), 0);
   const int row = bucket_of(p.y(), 1);
-  const int left = std::max(0, column - kReach);
-  const int right = std::min(buckets_.x() - 1, column + kReach);
+  const int left = std::max(0, column - kBucketReach);
+  const int right = std::min(buckets_.x() - 1, column + kBucketReach);
   std::vector<int> found;
-  for (int r = std::max(0, row - kReach); r <= std::min(buckets_.y() - 1, row + kReach); ++r) {
+  for (int r = std::max(0, row - kBucketReach); r <= std::min(buckets_.y() - 1, row + kBucketReach);
+       ++r) {
     const int first = begin_[bucket(left, r)];
     const int last = begin_[bucket(right, r) + 1];
     std::copy_if(members_.begin() + first, members_.begin() + last, std::back_inserter(found),

@@ -88,7 +88,6 @@ void Wire::receive(double wait, const std::function<void(const Reply&)>& take) {
 namespace {
 
 constexpr double kAskAgain = 0.5;          ///< Between two ? to a controller that is silent, s.
-constexpr double kStatusPause = 0.2;       ///< Between two ? otherwise: five a second.
 constexpr double kStopCheck = 0.1;         ///< Longest wait without a look at the stop token, s.
 constexpr double kResetAgain = 1.5;        ///< A reset that got lost is sent again, s.
 constexpr double kQuietAfterBanner = 0.3;  ///< Start-up lines and messages follow a banner, s.

@@ -19,6 +19,9 @@
 
 namespace lensforge {
 
+/// Between two ? while a controller answers: five a second, s.
+inline constexpr double kStatusPause = 0.2;
+
 /// Reason for stopping a stream.
 enum class StopCause {
   kNone,

@@ -16,7 +16,7 @@ namespace lensforge {
 namespace {
 
 constexpr std::size_t kMaxAxes = 8;
-constexpr std::size_t kLongestName = 12;
+constexpr std::size_t kLongestState = 12;
 
 constexpr std::array<std::pair<std::string_view, ReportedState>, 10> kStates{
     {{"Idle", ReportedState::kIdle},
@@ -31,7 +31,7 @@ constexpr std::array<std::pair<std::string_view, ReportedState>, 10> kStates{
      {"Tool", ReportedState::kTool}}};
 
 /// Maximum position, mm or inches, and speed; a larger number was garbled.
-constexpr int kLargestNumber = 1'000'000'000;
+constexpr int kLargestReading = 1'000'000'000;
 
 /// A field being read: whether it is as it should be.
 using Parse = bool (*)(std::string_view, StatusReport&);
@@ -47,7 +47,7 @@ std::optional<Number> number(std::string_view text) {
   const char* end = text.data() + text.size();
   const auto [stopped, error] = std::from_chars(text.data(), end, value);
   if (!plain_number(text) || error != std::errc() || stopped != end) return std::nullopt;
-  if (std::is_floating_point_v<Number> && !(std::abs(value) <= Number{kLargestNumber})) {
+  if (std::is_floating_point_v<Number> && !(std::abs(value) <= Number{kLargestReading})) {
     return std::nullopt;
   }
   return value;
@@ -146,7 +146,7 @@ constexpr std::array<Field, 11> kFields{{
 }};
 
 bool is_name(std::string_view text) {
-  return !text.empty() && text.size() <= kLongestName && text.front() >= 'A' &&
+  return !text.empty() && text.size() <= kLongestState && text.front() >= 'A' &&
          text.front() <= 'Z' && std::all_of(text.begin(), text.end(), [](unsigned char c) {
            return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
          });

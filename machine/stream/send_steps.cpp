@@ -19,8 +19,6 @@ constexpr double kStopCheck = 0.1;
 constexpr int kIdleReports = 2;
 /// A ? that got lost is asked again after this, s.
 constexpr double kAskAgain = 1.0;
-/// Five ? a second, s.
-constexpr double kStatusPause = 0.2;
 /// Tolerance of the controller's own speed report, which is rounded to whole rpm.
 constexpr double kSpeedTolerance = 0.01;
 /// Tolerance of an encoder's reading, share of the requested speed, and its reading at rest.

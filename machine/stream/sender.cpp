@@ -325,10 +325,9 @@ JobProgress SendRun::progress() const {
 
 // How a run ends.
 
-constexpr double kStatusPause = 0.2;  ///< Five ? a second.
-constexpr double kHoldAgain = 2.0;    ///< A ! that got lost is sent again after this, s.
-constexpr double kBannerWait = 3.0;   ///< Wait for the banner after a reset, s.
-constexpr double kReadWait = 0.05;    ///< Longest wait without a look at the second stop token, s.
+constexpr double kHoldAgain = 2.0;   ///< A ! that got lost is sent again after this, s.
+constexpr double kBannerWait = 3.0;  ///< Wait for the banner after a reset, s.
+constexpr double kReadWait = 0.05;   ///< Longest wait without a look at the second stop token, s.
 
 std::string word_for(SendStatus status) {
   return status == SendStatus::kDone          ? "done"

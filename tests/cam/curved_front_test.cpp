@@ -18,7 +18,7 @@
 #include "core/text/number_text.h"
 #include "design/render.h"
 
-namespace lensforge {
+namespace lensforge::curved_front_test {
 namespace {
 
 using lensforge::testing::coarse;
@@ -143,4 +143,4 @@ TEST(CurvedFrontCut, ABlankNarrowerThanTheLightBehindACurvedFrontIsWarnedOf) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::curved_front_test

@@ -22,7 +22,7 @@
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
 
-namespace lensforge {
+namespace lensforge::cut_extremes_test {
 namespace {
 
 using lensforge::testing::message_of;
@@ -284,4 +284,4 @@ TEST(CutExtremes, RapidsRunHalfAMillimetreAboveTheBlankAtLeast) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::cut_extremes_test

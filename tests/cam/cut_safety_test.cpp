@@ -22,7 +22,7 @@
 #include "core/error.h"
 #include "core/temp_folder.h"
 
-namespace lensforge {
+namespace lensforge::cut_safety_test {
 namespace {
 
 using lensforge::testing::DexelStock;
@@ -322,4 +322,4 @@ TEST(CutSafety, AControllerWithoutALimitOfLinesBearsAnyLoad) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::cut_safety_test

@@ -11,7 +11,7 @@
 #include "cam/milled_tiles.h"
 #include "cam/predict/part_surfaces.h"
 
-namespace lensforge {
+namespace lensforge::meant_surface_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -101,4 +101,4 @@ TEST(MeantSurface, AnotherModelIsPredictedAsItIs) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::meant_surface_test

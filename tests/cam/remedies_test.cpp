@@ -18,7 +18,7 @@
 #include "cam/workshop/tool.h"
 #include "core/temp_folder.h"
 
-namespace lensforge {
+namespace lensforge::remedies_test {
 namespace {
 
 using lensforge::testing::TempFolder;
@@ -287,4 +287,4 @@ TEST(StandardBalls, AreTheNextSmallerOnes) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::remedies_test

@@ -9,7 +9,7 @@
 #include "cam/plan/finishing.h"
 #include "core/temp_folder.h"
 
-namespace lensforge {
+namespace lensforge::sampling_test {
 namespace {
 
 using lensforge::testing::grid_mesh;
@@ -78,4 +78,4 @@ TEST(Sampling, TheErrorOfACoarseGridIsEstimated) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::sampling_test

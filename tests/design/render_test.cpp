@@ -20,7 +20,7 @@
 #include "design/setup/option_tables.h"
 #include "design/test_setups.h"
 
-namespace lensforge {
+namespace lensforge::render_test {
 namespace {
 
 using ::testing::EndsWith;
@@ -290,4 +290,4 @@ TEST(RenderSetup, TheWallLiesAboveTheSurface) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::render_test

@@ -20,7 +20,7 @@
 #include "export/spline/net_outline.h"
 #include "export/spline/spline_fit.h"
 
-namespace lensforge::testing {
+namespace lensforge::testing::trimmed_solid_test {
 namespace {
 
 const Eigen::Vector2d kSize(30.0, 24.0);
@@ -207,4 +207,4 @@ TEST_F(TrimmedSolidFile, WallsAreCylindersAndPlanes) {
 }
 
 }  // namespace
-}  // namespace lensforge::testing
+}  // namespace lensforge::testing::trimmed_solid_test

@@ -75,14 +75,13 @@ PtyController::~PtyController() {
 
 void PtyController::serve(const SimulatedOptions& options, double speed,
                           const MachineWatch& watch) {
-  using Clock = std::chrono::steady_clock;
   SimulatedController controller(options, watch);
-  const Clock::time_point begin = Clock::now();
+  const auto begin = std::chrono::steady_clock::now();
   std::string unsent;
   while (!ends_) {
     pollfd wanted{master_.number(), POLLIN, 0};
     ::poll(&wanted, 1, kPollMilliseconds);
-    const std::chrono::duration<double> passed = Clock::now() - begin;
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
     while (controller.run_until(passed.count() * speed) < passed.count() * speed) {
       for (const Spoken& spoken : controller.take_output()) unsent += spoken.text;
     }

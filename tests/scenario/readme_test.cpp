@@ -5,7 +5,7 @@
 
 #include "scenario/driver.h"
 
-namespace lensforge::scenario {
+namespace lensforge::scenario::readme_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -152,4 +152,4 @@ TEST_F(Readme, AWorkshopStatesItsDialectOnce) {
 }
 
 }  // namespace
-}  // namespace lensforge::scenario
+}  // namespace lensforge::scenario::readme_test

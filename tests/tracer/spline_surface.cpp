@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kDegree = 3;
 /// Points that every knot cell is divided into, each way.
-constexpr int kParts = 16;
+constexpr int kPartsPerCell = 16;
 
 /// The four basis functions that are not 0 at a parameter, and their derivatives.
 struct Basis {
@@ -95,8 +95,8 @@ void add_point(const Net& net, const Basis& u, const Basis& v, Mesh& mesh) {
 std::vector<Basis> bases(int control_points) {
   const int cells = control_points - kDegree;
   std::vector<Basis> all;
-  for (int i = 0; i <= cells * kParts; ++i) {
-    all.push_back(basis_at(static_cast<double>(i) / kParts, cells));
+  for (int i = 0; i <= cells * kPartsPerCell; ++i) {
+    all.push_back(basis_at(static_cast<double>(i) / kPartsPerCell, cells));
   }
   return all;
 }

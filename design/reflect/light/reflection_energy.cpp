@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <span>
 #include <utility>
@@ -117,7 +116,7 @@ class LightPaths::Caster {
     const bool facing = face.normal.dot(w) > 0.0;
     if (!facing && !goal_.has_place()) return 0;
     const Eigen::Vector3d p = point(face, d);
-    const bool lit = facing && !scene_.blocked(p, w, std::numeric_limits<double>::infinity());
+    const bool lit = facing && !scene_.blocked(p, w, RayScene::kAnywhere);
     if (!goal_.has_place()) return lit ? kLit | kSeen : 0;
     const Eigen::Vector3d away = goal_.place(p) - p;
     const bool seen =
@@ -449,8 +448,6 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kAnywhere = std::numeric_limits<double>::infinity();
-
 /// A stream of numbers in 0 … 1 (SplitMix64).
 class Random {
  public:
@@ -530,12 +527,13 @@ class PathEstimator::Walker {
   };
 
   [[nodiscard]] bool lit(Eigen::Index face, const Vector3d& p, const Vector3d& w) const {
-    return e_.faces_.normal.col(face).dot(w) > 0.0 && !e_.scene_.blocked(p, w, kAnywhere);
+    return e_.faces_.normal.col(face).dot(w) > 0.0 && !e_.scene_.blocked(p, w, RayScene::kAnywhere);
   }
 
   [[nodiscard]] bool seen(const Place& place) const {
     if (e_.faces_.normal.col(place.face).dot(place.w_o) <= 0.0) return false;
-    if (!e_.field_.goal.has_place()) return !e_.scene_.blocked(place.p, place.w_o, kAnywhere);
+    if (!e_.field_.goal.has_place())
+      return !e_.scene_.blocked(place.p, place.w_o, RayScene::kAnywhere);
     const double reach = (e_.field_.goal.place(place.p) - place.p).norm();
     return !e_.scene_.blocked(place.p, place.w_o, reach);
   }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -109,12 +110,15 @@ struct RayHit {
 /// threads.
 class RayScene {
  public:
+  /// As `reach`: however far away.
+  static constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+
   explicit RayScene(const SurfaceMesh& mesh);
 
   /// The first face hit by the ray from p along the unit vector w, from either side.
   [[nodiscard]] RayHit nearest(const Eigen::Vector3d& p, const Eigen::Vector3d& w) const;
 
-  /// True if a face lies within the distance `reach` (may be infinite) from p along w.
+  /// True if a face lies within the distance `reach` from p along w.
   [[nodiscard]] bool blocked(const Eigen::Vector3d& p, const Eigen::Vector3d& w,
                              double reach) const;
 

@@ -10,7 +10,7 @@
 #include "core/mesh/surface_mesh.h"
 #include "core/spline/cubic_spline.h"
 
-namespace lensforge {
+namespace lensforge::stored_surface_test {
 namespace {
 
 const Eigen::Vector2d kSize(30.0, 20.0);
@@ -114,4 +114,4 @@ TEST(StoredSurface, OfASplineWithEvenKnotsHasNoPlaces) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::stored_surface_test

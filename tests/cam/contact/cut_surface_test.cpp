@@ -10,7 +10,7 @@
 #include "cam/adversarial_meshes.h"
 #include "cam/path/finish_raster.h"
 
-namespace lensforge {
+namespace lensforge::cut_surface_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -135,4 +135,4 @@ TEST(CutSurface, ASmoothSurfaceNeedsFewerMovesThanItsFacets) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::cut_surface_test

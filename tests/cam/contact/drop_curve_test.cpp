@@ -11,7 +11,7 @@
 
 #include "cam/adversarial_meshes.h"
 
-namespace lensforge {
+namespace lensforge::drop_curve_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -177,4 +177,4 @@ TEST(DropCurve, IsEmptyWhereNothingLiesUnderTheBall) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::drop_curve_test

@@ -13,7 +13,7 @@
 
 #include "cam/cam_meshes.h"
 
-namespace lensforge {
+namespace lensforge::drop_cutter_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -284,4 +284,4 @@ TEST(DropCutter, SameBitsForAnyThreadsAndAnyStart) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::drop_cutter_test

@@ -15,7 +15,7 @@
 #include "cam/path/row_profile.h"
 #include "core/lens/smooth_surface.h"
 
-namespace lensforge {
+namespace lensforge::smooth_roll_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -261,4 +261,4 @@ TEST(SmoothRoll, RowsAreJudgedWithinTheRimAlone) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::smooth_roll_test

@@ -19,7 +19,7 @@
 #include "core/optics/optical_setup.h"
 #include "core/optics/screen.h"
 
-namespace lensforge {
+namespace lensforge::render_field_test {
 namespace {
 
 using testing::AnalyticField;
@@ -370,4 +370,4 @@ TEST(CreaseSplit, PiecesTakeExactlyTheTrianglesFlux) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::render_field_test

@@ -14,7 +14,7 @@
 #include "cam/milled_tiles.h"
 #include "cam/path/finish_raster.h"
 
-namespace lensforge {
+namespace lensforge::milled_field_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -430,4 +430,4 @@ TEST(MilledField, SameBitsForAnyTilesAndThreads) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::milled_field_test

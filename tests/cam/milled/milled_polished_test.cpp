@@ -13,7 +13,7 @@
 #include "cam/milled_tiles.h"
 #include "core/error.h"
 
-namespace lensforge {
+namespace lensforge::milled_polished_test {
 namespace {
 
 const Eigen::AlignedBox2d kLens(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(2.0, 1.5));
@@ -352,4 +352,4 @@ TEST(PolishedField, SameBitsForAnyTilesAndThreads) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::milled_polished_test

@@ -11,7 +11,7 @@
 #include "cam/milled_tiles.h"
 #include "core/lens/smooth_surface.h"
 
-namespace lensforge {
+namespace lensforge::milled_rounded_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -287,4 +287,4 @@ TEST(RoundedField, PlacesThatBendLessThanTheBallNeedNoFacets) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::milled_rounded_test

@@ -14,7 +14,7 @@
 #include "cam/milled_paths.h"
 #include "core/lens/surface_field.h"
 
-namespace lensforge {
+namespace lensforge::milled_tiles_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -166,4 +166,4 @@ TEST(CreaseMap, ASurfaceWithoutValleysHasNone) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::milled_tiles_test

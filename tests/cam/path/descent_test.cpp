@@ -11,7 +11,7 @@
 #include "cam/path/collision.h"
 #include "cam/path/rough.h"
 
-namespace lensforge {
+namespace lensforge::descent_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -144,4 +144,4 @@ TEST(Descent, AnArcThatSinksIsLookedAtAlongItsWay) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::descent_test

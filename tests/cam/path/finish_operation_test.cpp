@@ -10,7 +10,7 @@
 #include "cam/cam_meshes.h"
 #include "cam/path/finish_raster.h"
 
-namespace lensforge {
+namespace lensforge::finish_operation_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -179,4 +179,4 @@ TEST(FinishOperation, StoppedIsNotComplete) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::finish_operation_test

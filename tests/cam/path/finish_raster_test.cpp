@@ -14,7 +14,7 @@
 #include "core/error.h"
 #include "machine/gcode/gcode_motion.h"
 
-namespace lensforge {
+namespace lensforge::finish_raster_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -300,4 +300,4 @@ TEST(FinishRaster, RefusesAHoleInTheSurface) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::finish_raster_test

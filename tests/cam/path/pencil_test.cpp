@@ -9,7 +9,7 @@
 
 #include "cam/adversarial_meshes.h"
 
-namespace lensforge {
+namespace lensforge::pencil_test {
 namespace {
 
 constexpr double kRadius = 0.2;
@@ -134,4 +134,4 @@ TEST(Pencil, FollowsASmoothSurfaceAsAWhole) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::pencil_test

@@ -13,7 +13,7 @@
 #include "cam/contact/cut_surface.h"
 #include "cam/row_certificate.h"
 
-namespace lensforge {
+namespace lensforge::row_fit_test {
 namespace {
 
 using lensforge::testing::certify_row;
@@ -222,4 +222,4 @@ TEST(ArcFit, FollowsAPlaneInOneMove) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::row_fit_test

@@ -8,7 +8,7 @@
 
 #include "cam/path/row_fit.h"
 
-namespace lensforge {
+namespace lensforge::row_joints_test {
 namespace {
 
 /// A wave between level ends, as a polyline with a joint at each node.
@@ -96,4 +96,4 @@ TEST(RowJoints, LevelEndsKeepTheCurveAndBeginOnTheGrid) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::row_joints_test

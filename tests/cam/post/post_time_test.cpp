@@ -8,7 +8,7 @@
 #include "cam/post/program_writer.h"
 #include "cam/post_plans.h"
 
-namespace lensforge {
+namespace lensforge::post_time_test {
 namespace {
 
 using namespace lensforge::testing;
@@ -122,4 +122,4 @@ TEST(ProgramTime, TheWorkshopsMachineSetsThePlanner) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::post_time_test

@@ -24,7 +24,7 @@
 #include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
 
-namespace lensforge {
+namespace lensforge::part_model_test {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -435,4 +435,4 @@ TEST_F(PartModelTest, StopsWhenItIsAskedTo) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::part_model_test

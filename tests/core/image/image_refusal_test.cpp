@@ -30,7 +30,7 @@
 #include "core/test_images.h"
 #include "core/text/words.h"
 
-namespace lensforge {
+namespace lensforge::image_refusal_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -496,4 +496,4 @@ TEST(PictureReader, EveryMutantIsAPictureOrOnePrintableLine) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::image_refusal_test

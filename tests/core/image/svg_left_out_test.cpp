@@ -18,7 +18,7 @@
 #include "core/temp_folder.h"
 #include "core/test_images.h"
 
-namespace lensforge {
+namespace lensforge::svg_left_out_test {
 namespace {
 
 using lensforge::testing::TempFolder;
@@ -444,4 +444,4 @@ TEST(SvgPictures, ThatCannotBeTurnedAreNamed) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::svg_left_out_test

@@ -17,7 +17,7 @@
 #include "core/test_meshes.h"
 #include "core/text/version.h"
 
-namespace lensforge {
+namespace lensforge::mesh_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -291,4 +291,4 @@ TEST(MeshIo, AFullDiskNamesFileAndReasonAndLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::mesh_files_test

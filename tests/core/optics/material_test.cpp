@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/temp_folder.h"
 
-namespace lensforge {
+namespace lensforge::material_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -79,4 +79,4 @@ TEST(Material, WhatIsNoneIsRefusedInOneLine) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::material_test

@@ -5,7 +5,7 @@
 #include "core/error.h"
 #include "core/text/read_numbers.h"
 
-namespace lensforge {
+namespace lensforge::units_test {
 namespace {
 
 TEST(Units, ANumberWithoutUnitIsMillimetres) {
@@ -34,10 +34,10 @@ TEST(Units, RefusesWhatIsNoLengthAndNamesOptionAndValue) {
       parse_length_mm(text, "--width");
       ADD_FAILURE() << text << " was accepted";
     } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), testing::StartsWith(std::string("--width: '") + text + "'"));
+      EXPECT_THAT(error.what(), ::testing::StartsWith(std::string("--width: '") + text + "'"));
     }
   }
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::units_test

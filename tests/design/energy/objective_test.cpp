@@ -20,7 +20,7 @@
 #include "design/random_input.h"
 #include "design/render/render_flux.h"
 
-namespace lensforge {
+namespace lensforge::objective_test {
 namespace {
 
 using testing::correspondence;
@@ -351,4 +351,4 @@ TEST(Objective, DefaultAreaBarrierIsAShareOfTheMeanTriangle) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::objective_test

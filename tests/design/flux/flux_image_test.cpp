@@ -16,7 +16,7 @@
 #include "design/random_triangles.h"
 #include "design/test_setups.h"
 
-namespace lensforge {
+namespace lensforge::flux_image_test {
 namespace {
 
 using testing::Random;
@@ -295,4 +295,4 @@ TEST(SourceBlur, WithoutASourcesExtentNothingChanges) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::flux_image_test

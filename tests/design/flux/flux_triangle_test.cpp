@@ -18,7 +18,7 @@
 #include "design/flux/flux_image.h"
 #include "design/random_triangles.h"
 
-namespace lensforge {
+namespace lensforge::flux_triangle_test {
 namespace {
 
 using testing::kColumns;
@@ -455,4 +455,4 @@ TEST(FluxTriangle, NeedlesFeelOnlyTheirFlux) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::flux_triangle_test

@@ -21,7 +21,7 @@
 #include "design/snell.h"
 #include "design/test_setups.h"
 
-namespace lensforge {
+namespace lensforge::render_flux_test {
 namespace {
 
 using testing::height_field;
@@ -270,4 +270,4 @@ TEST(FluxOfSurface, AdjointOfAnOutlinedLensIsRefused) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::render_flux_test

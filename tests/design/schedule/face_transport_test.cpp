@@ -21,7 +21,7 @@
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 
-namespace lensforge {
+namespace lensforge::face_transport_test {
 namespace {
 
 constexpr double kThickness = 5.0;  ///< mm
@@ -359,4 +359,4 @@ TEST(CreaseAlignment, LeavesAMeshWithoutCreasesAlone) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::face_transport_test

@@ -13,7 +13,7 @@
 #include "design/schedule/face_transport.h"
 #include "design/test_setups.h"
 
-namespace lensforge {
+namespace lensforge::guided_optimization_test {
 namespace {
 
 const Eigen::Vector2d kSize(28.0, 20.0);
@@ -213,4 +213,4 @@ TEST(GuidedOptimization, KnowsWhatIsFeasible) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::guided_optimization_test

@@ -19,7 +19,7 @@
 #include "design/schedule/rounds.h"
 #include "design/test_setups.h"
 
-namespace lensforge {
+namespace lensforge::levels_test {
 namespace {
 
 DesignOptions with_levels(int levels, double ratio = 1.25) {
@@ -390,4 +390,4 @@ TEST(LevelStart, ASplineOfASurfaceThatReflectsTotallyIsDrawnBackUntilItDoesNot) 
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::levels_test

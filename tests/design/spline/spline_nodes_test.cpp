@@ -16,7 +16,7 @@
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 
-namespace lensforge {
+namespace lensforge::spline_nodes_test {
 namespace {
 
 using testing::Random;
@@ -233,4 +233,4 @@ TEST(SplineNodes, AdjointOfMadeNodesEqualsCentralDifferences) {
 
 }  // namespace
 
-}  // namespace lensforge
+}  // namespace lensforge::spline_nodes_test

@@ -13,7 +13,7 @@
 #include "design/test_setups.h"
 #include "design/transport_scenes.h"
 
-namespace lensforge {
+namespace lensforge::power_diagram_test {
 namespace {
 
 using testing::Random;
@@ -264,4 +264,4 @@ TEST(PowerTest, TellsHeightsApartThatRoundTogether) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::power_diagram_test

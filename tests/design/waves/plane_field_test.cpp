@@ -7,7 +7,7 @@
 
 #include "design/waves/wave_tile.h"
 
-namespace lensforge {
+namespace lensforge::plane_field_test {
 namespace {
 
 constexpr double kWavelength = 550e-6;
@@ -208,4 +208,4 @@ TEST(PlaneField, SizesOfTransformsAreSmoothAndEven) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::plane_field_test

@@ -19,7 +19,7 @@
 #include "design/test_setups.h"
 #include "design/waves/wave_picture.h"
 
-namespace lensforge {
+namespace lensforge::wave_objective_test {
 namespace {
 
 constexpr double kSide = 3.0;
@@ -255,4 +255,4 @@ TEST(DesignByWaves, HalvesTheErrorOfItsPicture) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::wave_objective_test

@@ -16,7 +16,7 @@
 #include "core/optics/light_path.h"
 #include "design/render.h"
 
-namespace lensforge {
+namespace lensforge::wave_picture_test {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -300,4 +300,4 @@ TEST(WavePicture, SameBitsForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::wave_picture_test

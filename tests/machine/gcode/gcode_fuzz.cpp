@@ -49,7 +49,7 @@ void check_compact(const GcodeText& text, const GcodeBlock& block) {
   }
 }
 
-std::int64_t run_program(const std::string& program, const GcodeDialect& dialect) {
+std::int64_t check_program(const std::string& program, const GcodeDialect& dialect) {
   std::istringstream in(program);
   GcodeReader reader(in);
   GcodeInterpreter interpreter(dialect);
@@ -82,7 +82,7 @@ std::int64_t fuzz_gcode(const std::uint8_t* data, std::size_t size) {
   std::int64_t lines = 0;
   for (const GcodeDialect& dialect : {grbl_dialect(), grblhal_dialect(), linuxcnc_dialect(),
                                       fanuc_dialect(), weihong_dialect()}) {
-    lines += run_program(program, dialect);
+    lines += check_program(program, dialect);
   }
   return lines;
 }

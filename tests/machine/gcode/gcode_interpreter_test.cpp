@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "machine/gcode_text.h"
 
-namespace lensforge {
+namespace lensforge::gcode_interpreter_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -357,4 +357,4 @@ TEST(GcodeDialect, IsKnownByName) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::gcode_interpreter_test

@@ -12,7 +12,7 @@
 
 #include "core/error.h"
 
-namespace lensforge {
+namespace lensforge::gcode_reader_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -170,4 +170,4 @@ TEST(GcodeReader, HoldsTheLineLimitToTheCharacter) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::gcode_reader_test

@@ -13,7 +13,7 @@
 #include "core/text/words.h"
 #include "machine/gcode/program_seal.h"
 
-namespace lensforge {
+namespace lensforge::gcode_seal_test {
 namespace {
 
 /// GCC 12 warns falsely (-Wrestrict) of a literal + a string.
@@ -137,4 +137,4 @@ TEST(ProgramSeal, NothingIsSaidOfAProgramWithoutOne) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::gcode_seal_test

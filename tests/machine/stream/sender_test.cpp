@@ -15,7 +15,7 @@
 #include "machine/stream/journal.h"
 #include "machine/stream/program_feed.h"
 
-namespace lensforge {
+namespace lensforge::sender_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -432,4 +432,4 @@ TEST_F(SenderTest, SpindleAndCutInOneLineIsRefused) {
 }
 
 }  // namespace
-}  // namespace lensforge
+}  // namespace lensforge::sender_test
