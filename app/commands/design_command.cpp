@@ -498,12 +498,18 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
   return summary;
 }
 
+/// Why cam's figure of the same part is another one.
+constexpr const char* kMadeWords =
+    "          as cut and polished on average; cam adds its paths' errors and what the ball "
+    "rounds\n";
+
 std::string summary_text(const fs::path& folder, const DesignResult& result) {
   const Lens& lens = result.lens;
   return folder.string() + ": " + result.message + "\n" +  //
          metrics_text(lens) +                              //
          (result.colors ? fringe_text(result.colors->fringe) : "") +
-         (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" : "") +
+         (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" + kMadeWords
+                      : "") +
          (result.wall ? "  by waves " + metrics_text(result.wall->metrics) + "\n" : "") +
          "  on the wall " + blur_words(blurs_of(lens)) + "\n  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
@@ -511,7 +517,6 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          fixed(lens.provenance.json()["seconds"].get<double>(), 1) + " s\n";
 }
 
-/// Saves the result. An earlier lens of another design stays until this one is done.
 /// The command that cuts the lens, in the workshop that it was designed for.
 std::string cam_words(const DesignSettings& settings, const fs::path& folder) {
   const bool named = !settings.made_by.empty() && settings.made_by != "default";
@@ -519,6 +524,7 @@ std::string cam_words(const DesignSettings& settings, const fs::path& folder) {
          (named ? " --workshop " + shell_word(settings.made_by) : std::string());
 }
 
+/// Saves the result. An earlier lens of another design stays until this one is done.
 CommandResult finish(CommandFrame& frame, const ChosenDevice& device,
                      const DesignSettings& settings, const fs::path& folder, DesignResult& result) {
   const DesignOptions& design = settings.design;

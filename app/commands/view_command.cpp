@@ -13,6 +13,8 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/text/words.h"
+#include "design/setup/design_options.h"
+#include "design/setup/option_tables.h"
 
 namespace lensforge::app {
 namespace {
@@ -24,12 +26,14 @@ struct ViewSettings {
   std::string source;
   std::string out;
   bool force = false;
+  OtherLight light;
 };
 
 void describe(Description& d, ViewSettings& settings) {
   d.text("DIR", settings.source, "", "lens folder").needed = true;
   d.text("--out", settings.out, "FILE", "the page to write, .html").needed = true;
   d.flag("--force", settings.force, "replace a file that lensforge did not write");
+  describe(d, settings.light);
 }
 
 void require_page_name(const std::string& out) {
@@ -73,11 +77,20 @@ std::vector<std::string> warnings_of(const LensView& view) {
   return warnings;
 }
 
+/// Reads the lamp's picture, if it has one.
+void read_shape(LightOptions& light, CommandFrame& frame) {
+  for (const std::string& change : read_lamp(light, Background(), frame.control())) {
+    frame.console().note("--lamp " + light.source_picture + ": " + change);
+  }
+}
+
 CommandResult run(CommandFrame& frame, ViewSettings& settings) {
   require_page_name(settings.out);
   require_replaceable("--out", settings.out, settings.force);
   frame.begin_file(settings.out);
-  const LensView view = read_view(settings.source, frame.executor(), frame.control());
+  read_shape(settings.light.light, frame);
+  const LensView view =
+      read_view(settings.source, settings.light, frame.executor(), frame.control());
   for (const std::string& note : view.notes) frame.console().note(note);
   const std::string page = view_page(view);
   frame.begin_writing();

@@ -271,13 +271,8 @@ ViewedSurface viewed_part(const std::string& id, const std::string& words, const
 }
 
 /// Adds the surfaces of a part, and what each cause makes of the picture.
-void add_forecast(const fs::path& folder, const Lens& lens, const Executor& executor,
-                  const RunControl& control, LensView& view) {
-  CutForecast forecast = read_forecast(folder, lens, control);
-  if (!forecast.note.empty()) {
-    view.notes.push_back((folder / lens_file::kCut).string() + ": " + forecast.note);
-  }
-  if (forecast.empty()) return;
+void add_forecast(CutForecast forecast, const Lens& lens, const Executor& executor,
+                  LensView& view) {
   view.surfaces.push_back(viewed_part("polished", "only polished", forecast.polished,
                                       forecast.causes[1].picture, lens, executor));
   view.surfaces.push_back(viewed_part("part", "cut and polished", forecast.part,
@@ -289,6 +284,30 @@ void add_forecast(const fs::path& folder, const Lens& lens, const Executor& exec
   view.causes.back().surface = "part";
   view.path = std::move(forecast.path);
   view.leakage_map = std::move(forecast.leakage_map);
+}
+
+/// The picture of a lens, or of one with another surface, by rays.
+Image picture_of(const Lens& lens, const Executor& executor, const RunControl& control) {
+  Image picture;
+  evaluate(lens, lens.model, &picture, executor, Look::kThorough, control);
+  return picture;
+}
+
+/// The same without what is known only in the lens's own light.
+void add_relit_forecast(const CutForecast& forecast, const Lens& lens, const Executor& executor,
+                        const RunControl& control, LensView& view) {
+  const auto add = [&](const std::string& id, const std::string& words, const ControlNet& net,
+                       const std::string& cause) {
+    Lens part = lens;
+    part.spline = net;
+    part.model = SurfaceModel::kSpline;
+    Image picture = picture_of(part, executor, control);
+    view.surfaces.push_back(viewed_part(id, words, net, picture, lens, executor));
+    view.causes.push_back({cause, id, std::move(picture)});
+  };
+  add("polished", "only polished", forecast.polished, forecast.causes[1].cause);
+  add("part", "cut and polished", forecast.part, forecast.causes.back().cause);
+  view.path = forecast.path;
 }
 
 /// Adds the pictures by waves of a lens and of its part, where the folder has them.
@@ -306,6 +325,13 @@ void add_waves(const fs::path& folder, const RunControl& control, LensView& view
       parse_json(read_whole_file(report, kMaxReportBytes), report.string());
   if (document.contains("waves"))
     add(folder / lens_file::kCut / cam_file::kWall, "cut and polished");
+}
+
+std::string words_of(const OtherLight& light) {
+  std::string words;
+  if (!light.light.lamp.empty()) words = with_word(words, "--lamp " + light.light.lamp);
+  if (!light.material.empty()) words = with_word(words, "--material " + light.material);
+  return words;
 }
 
 }  // namespace
@@ -344,16 +370,31 @@ LensView view_of_lens(const Lens& lens, const std::string& name, const Executor&
   return view;
 }
 
-LensView read_view(const fs::path& folder, const Executor& executor, const RunControl& control) {
-  const Lens lens = read_lens(folder);
+LensView read_view(const fs::path& folder, const OtherLight& light, const Executor& executor,
+                   const RunControl& control) {
+  Lens lens = read_lens(folder);
   if (lens.render.empty()) {
     throw InputError(folder.string() + ": holds no " + lens_file::kRenderExr +
                      ", the picture that the lens projects; design it again");
   }
   control.report({"picture", 0.0, 0.0, ""});
-  LensView view = view_of_lens(lens, fs::weakly_canonical(folder).filename().string(), executor);
-  add_forecast(folder, lens, executor, control, view);
-  add_waves(folder, control, view);
+  const std::string name = fs::weakly_canonical(folder).filename().string();
+  CutForecast forecast = read_forecast(folder, lens, control);
+  if (!light.none()) {
+    put_light(light, lens.setup);
+    lens.render = picture_of(lens, executor, control);
+  }
+  LensView view = view_of_lens(lens, name, executor);
+  view.other_light = words_of(light);
+  if (!forecast.note.empty()) {
+    view.notes.push_back((folder / lens_file::kCut).string() + ": " + forecast.note);
+  }
+  if (!forecast.empty() && light.none()) {
+    add_forecast(std::move(forecast), lens, executor, view);
+  } else if (!forecast.empty()) {
+    add_relit_forecast(forecast, lens, executor, control, view);
+  }
+  if (light.none()) add_waves(folder, control, view);
   if (control.stop_requested()) throw Interrupted();
   return view;
 }
@@ -557,7 +598,8 @@ std::string header(const LensView& view) {
   const std::string words =
       capitalised(traits(setup.body).name) + " of " + size_words(setup.lens_size) + ", " +
       view.model + " model, in " + traits(setup.lamp).name + "; picture of " +
-      size_words(setup.image_size) + " at z = " + decimal_text(setup.focal_length, 0) + " mm";
+      size_words(setup.image_size) + " at z = " + decimal_text(setup.focal_length, 0) + " mm" +
+      (view.other_light.empty() ? "" : "; drawn with " + view.other_light);
   return element("h1", "", escape_html(view.name)) + element("p", "", escape_html(words));
 }
 

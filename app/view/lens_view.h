@@ -13,6 +13,7 @@
 #include "core/image/image.h"
 #include "core/lens/lens.h"
 #include "core/optics/optical_setup.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge {
 
@@ -55,9 +56,10 @@ struct LensView {
   std::vector<WavePicture> waves;       ///< Of the folder, if design or cam followed waves.
   /// The causes of error between target and part, step by step, and the surface for each.
   std::vector<ViewedCause> causes;
-  LensRaster relief;               ///< Heights of the designed surface, mm.
-  std::vector<ReportPath> path;    ///< Tool paths; empty without programs.
-  std::string leakage_map;         ///< Bytes of a PNG; empty if there is none.
+  LensRaster relief;             ///< Heights of the designed surface, mm.
+  std::vector<ReportPath> path;  ///< Tool paths; empty without programs.
+  std::string leakage_map;       ///< Bytes of a PNG; empty if there is none.
+  std::string other_light;  ///< The lamp and material that were asked for, or empty: its own light.
   std::vector<std::string> notes;  ///< For the user who requested the page.
 };
 
@@ -70,10 +72,13 @@ LensRaster relief_of(const Lens& lens);
 /// Content of a page for a lens without predictions. @pre the lens has a picture.
 LensView view_of_lens(const Lens& lens, const std::string& name, const Executor& executor);
 
-/// Reads a lens folder, with `cam`'s predictions for the part, if present.
-/// @throw InputError if it is no lens folder or has no rendered picture; Interrupted.
-LensView read_view(const std::filesystem::path& folder, const Executor& executor,
-                   const RunControl& control);
+/// Reads a lens folder, with `cam`'s predictions for the part, if present. In another light the
+/// pictures of the surfaces are computed anew; of the pictures in the folder, which are in the
+/// lens's own light, none is taken.
+/// @throw InputError if it is no lens folder or has no rendered picture, or if the light does not
+///        fit it; Interrupted.
+LensView read_view(const std::filesystem::path& folder, const OtherLight& light,
+                   const Executor& executor, const RunControl& control);
 
 /// Returns the page that shows a lens: one self-contained HTML file that computes the projected
 /// picture itself.

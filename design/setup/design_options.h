@@ -172,6 +172,17 @@ void put_lamp(const LightOptions& light, OpticalSetup& setup);
 /// @throw InputError naming option, text and rule.
 void set_material(const std::string& text, const LightOptions& light, double& ior, double& abbe);
 
+/// A lamp and a material that a finished lens is seen with instead of its own.
+struct OtherLight {
+  LightOptions light;    ///< Of `--lamp`; without one the lens's own stays.
+  std::string material;  ///< As typed; empty: the lens's own.
+
+  [[nodiscard]] bool none() const { return light.lamp.empty() && material.empty(); }
+};
+
+/// @throw InputError as put_lamp() and set_material() do.
+void put_light(const OtherLight& other, OpticalSetup& setup);
+
 /// Reads the shape of a source from LightOptions::source_picture, if there is one.
 /// @return what was changed in the picture. @throw InputError; Interrupted.
 std::vector<std::string> read_lamp(LightOptions& light, const Background& background,

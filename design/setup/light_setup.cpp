@@ -686,6 +686,11 @@ void set_material(const std::string& text, const LightOptions& light, double& io
   abbe = material.abbe();
 }
 
+void put_light(const OtherLight& other, OpticalSetup& setup) {
+  if (!other.light.lamp.empty()) put_lamp(other.light, setup);
+  set_material(other.material, other.light, setup.ior, setup.spectrum.abbe);
+}
+
 std::vector<std::string> read_lamp(LightOptions& light, const Background& background,
                                    const RunControl& control) {
   if (light.source_picture.empty()) return {};

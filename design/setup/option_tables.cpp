@@ -282,6 +282,18 @@ void describe_colours(Description& d, Spectrum& spectrum) {
 
 }  // namespace
 
+void describe(Description& d, OtherLight& o) {
+  describe_lamp(d, o.light);
+  d.text(
+      material_spec(), [&o] { return o.material; },
+      [&o](const std::string& text) {
+        double index = 0.0;
+        double abbe = 0.0;
+        set_material(text, o.light, index, abbe);  // So that a wrong one is refused now.
+        o.material = text;
+      });
+}
+
 void describe(Description& d, RenderOptions& o) {
   describe_lamp(d, o.light);
   d.text(

@@ -18,6 +18,8 @@ void describe(Description& d, LightOptions& o);
 /// The weights, stored like a design's other options.
 void describe(Description& d, ObjectiveWeights& w);
 
+void describe(Description& d, OtherLight& o);
+
 /// Options of a rendering.
 struct RenderOptions {
   SurfaceModel model = SurfaceModel::kFacet;

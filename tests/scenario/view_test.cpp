@@ -118,6 +118,39 @@ TEST_F(View, HasTheLightOfAnotherScreenAndIndexThatTheProgramHas) {
   EXPECT_LT(mae(got.front(), wanted), 0.01);
 }
 
+TEST_F(View, DrawsALensAndItsPartInAnotherLight) {
+  cut();
+  const Arguments light{"--lamp", "led:4mm@300mm", "--material", "pc"};
+  Arguments arguments{"view", path("lens"), "--out", path("view.html"), "--json"};
+  arguments.insert(arguments.end(), light.begin(), light.end());
+  const Outcome made = run(arguments);
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(made.json()["surfaces"].size(), 3U);
+  EXPECT_THAT(content(at("view.html")),
+              HasSubstr("drawn with --lamp led:4mm@300mm, --material pc"));
+  arguments = {"render", path("lens"), "--out", path("other.exr"), "--quiet"};
+  arguments.insert(arguments.end(), light.begin(), light.end());
+  ASSERT_EQ(run(arguments).exit_code, 0);
+  if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
+  const Image wanted = read_image(at("other.exr")).image;
+  const auto pictures = drawn({"", "view.set('surface', 'part');"});
+  EXPECT_GT(mae(render_, wanted), 0.02);
+  EXPECT_LT(mae(pictures[0], wanted), 0.01);
+  EXPECT_LT(mae(pictures[1], wanted), 0.5 * mae(render_, wanted));
+}
+
+TEST_F(View, RefusesALightThatDoesNotFit) {
+  const auto refused = [&](const Arguments& more, const std::vector<std::string>& parts) {
+    Arguments arguments{"view", path("lens"), "--out", path("no.html")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refusal(run(arguments), 2, parts);
+    EXPECT_FALSE(fs::exists(at("no.html")));
+  };
+  refused({"--lamp", "candle"}, {"--lamp", "candle"});
+  refused({"--material", "wood"}, {"--material", "wood"});
+  refused({"--lamp", path("none.png") + ":3mm@600mm"}, {"none.png"});
+}
+
 TEST_F(View, ShowsTheForecastOfThePartAndTheCauseAtASpot) {
   if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
   cut();
