@@ -271,43 +271,50 @@ ViewedSurface viewed_part(const std::string& id, const std::string& words, const
 }
 
 /// Adds the surfaces of a part, and what each cause makes of the picture.
-void add_forecast(CutForecast forecast, const Lens& lens, const Executor& executor,
+void add_forecast(const CutForecast& forecast, const Lens& lens, const Executor& executor,
                   LensView& view) {
   view.surfaces.push_back(viewed_part("polished", "only polished", forecast.polished,
                                       forecast.causes[1].picture, lens, executor));
   view.surfaces.push_back(viewed_part("part", "cut and polished", forecast.part,
                                       forecast.causes.back().picture, lens, executor));
-  for (CausePicture& cause : forecast.causes) {
-    view.causes.push_back({std::move(cause.cause), "", std::move(cause.picture)});
+  for (const CausePicture& cause : forecast.causes) {
+    view.causes.push_back({cause.cause, "", cause.picture});
   }
   view.causes[2].surface = "polished";
   view.causes.back().surface = "part";
-  view.path = std::move(forecast.path);
-  view.leakage_map = std::move(forecast.leakage_map);
-}
-
-/// The picture of a lens, or of one with another surface, by rays.
-Image picture_of(const Lens& lens, const Executor& executor, const RunControl& control) {
-  Image picture;
-  evaluate(lens, lens.model, &picture, executor, Look::kThorough, control);
-  return picture;
-}
-
-/// The same without what is known only in the lens's own light.
-void add_relit_forecast(const CutForecast& forecast, const Lens& lens, const Executor& executor,
-                        const RunControl& control, LensView& view) {
-  const auto add = [&](const std::string& id, const std::string& words, const ControlNet& net,
-                       const std::string& cause) {
-    Lens part = lens;
-    part.spline = net;
-    part.model = SurfaceModel::kSpline;
-    Image picture = picture_of(part, executor, control);
-    view.surfaces.push_back(viewed_part(id, words, net, picture, lens, executor));
-    view.causes.push_back({cause, id, std::move(picture)});
-  };
-  add("polished", "only polished", forecast.polished, forecast.causes[1].cause);
-  add("part", "cut and polished", forecast.part, forecast.causes.back().cause);
   view.path = forecast.path;
+  view.leakage_map = forecast.leakage_map;
+}
+
+std::string words_of(const OtherLight& light) {
+  std::string words;
+  if (!light.light.lamp.empty()) words = with_word(words, "--lamp " + light.light.lamp);
+  if (!light.material.empty()) words = with_word(words, "--material " + light.material);
+  return words;
+}
+
+/// Shows a view's surfaces in another light, and nothing that is known only in the lens's own. How
+/// well they are stored stays as found in that.
+void relight(const OtherLight& light, Lens lens, const CutForecast& forecast,
+             const Executor& executor, const RunControl& control, LensView& view) {
+  put_light(light, lens.setup);
+  view.setup = lens.setup;
+  view.other_light = words_of(light);
+  view.leakage_map.clear();
+  for (ViewedSurface& viewed : view.surfaces) {
+    Lens shown = lens;
+    if (viewed.id != "designed") {
+      shown.spline = viewed.id == "part" ? forecast.part : forecast.polished;
+      shown.model = SurfaceModel::kSpline;
+    }
+    evaluate(shown, shown.model, &viewed.picture, executor, Look::kBrief, control);
+  }
+  std::erase_if(view.causes, [](const ViewedCause& step) { return step.surface.empty(); });
+  for (ViewedCause& step : view.causes) {
+    const auto shown = std::find_if(view.surfaces.begin(), view.surfaces.end(),
+                                    [&](const ViewedSurface& s) { return s.id == step.surface; });
+    step.picture = shown->picture;
+  }
 }
 
 /// Adds the pictures by waves of a lens and of its part, where the folder has them.
@@ -325,13 +332,6 @@ void add_waves(const fs::path& folder, const RunControl& control, LensView& view
       parse_json(read_whole_file(report, kMaxReportBytes), report.string());
   if (document.contains("waves"))
     add(folder / lens_file::kCut / cam_file::kWall, "cut and polished");
-}
-
-std::string words_of(const OtherLight& light) {
-  std::string words;
-  if (!light.light.lamp.empty()) words = with_word(words, "--lamp " + light.light.lamp);
-  if (!light.material.empty()) words = with_word(words, "--material " + light.material);
-  return words;
 }
 
 }  // namespace
@@ -372,29 +372,24 @@ LensView view_of_lens(const Lens& lens, const std::string& name, const Executor&
 
 LensView read_view(const fs::path& folder, const OtherLight& light, const Executor& executor,
                    const RunControl& control) {
-  Lens lens = read_lens(folder);
+  const Lens lens = read_lens(folder);
   if (lens.render.empty()) {
     throw InputError(folder.string() + ": holds no " + lens_file::kRenderExr +
                      ", the picture that the lens projects; design it again");
   }
   control.report({"picture", 0.0, 0.0, ""});
   const std::string name = fs::weakly_canonical(folder).filename().string();
-  CutForecast forecast = read_forecast(folder, lens, control);
-  if (!light.none()) {
-    put_light(light, lens.setup);
-    lens.render = picture_of(lens, executor, control);
-  }
+  const CutForecast forecast = read_forecast(folder, lens, control);
   LensView view = view_of_lens(lens, name, executor);
-  view.other_light = words_of(light);
   if (!forecast.note.empty()) {
     view.notes.push_back((folder / lens_file::kCut).string() + ": " + forecast.note);
   }
-  if (!forecast.empty() && light.none()) {
-    add_forecast(std::move(forecast), lens, executor, view);
-  } else if (!forecast.empty()) {
-    add_relit_forecast(forecast, lens, executor, control, view);
+  if (!forecast.empty()) add_forecast(forecast, lens, executor, view);
+  if (light.none()) {
+    add_waves(folder, control, view);
+  } else {
+    relight(light, lens, forecast, executor, control, view);
   }
-  if (light.none()) add_waves(folder, control, view);
   if (control.stop_requested()) throw Interrupted();
   return view;
 }

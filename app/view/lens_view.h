@@ -73,8 +73,8 @@ LensRaster relief_of(const Lens& lens);
 LensView view_of_lens(const Lens& lens, const std::string& name, const Executor& executor);
 
 /// Reads a lens folder, with `cam`'s predictions for the part, if present. In another light the
-/// pictures of the surfaces are computed anew; of the pictures in the folder, which are in the
-/// lens's own light, none is taken.
+/// pictures of the surfaces are computed anew, briefly (Look); of those in the folder, which are in
+/// the lens's own light, none is taken.
 /// @throw InputError if it is no lens folder or has no rendered picture, or if the light does not
 ///        fit it; Interrupted.
 LensView read_view(const std::filesystem::path& folder, const OtherLight& light,
