@@ -36,7 +36,8 @@ Outline star(int tips) {
   std::vector<Eigen::Vector2d> points;
   for (int k = 0; k < 2 * tips; ++k) {
     const double angle = std::numbers::pi * k / tips;
-    points.push_back((k % 2 == 0 ? 1.0 : 0.9) * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    points.emplace_back((k % 2 == 0 ? 1.0 : 0.9) *
+                        Eigen::Vector2d(std::cos(angle), std::sin(angle)));
   }
   return polygon_outline(kSize, points);
 }

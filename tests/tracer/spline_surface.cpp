@@ -82,7 +82,9 @@ void add_point(const Net& net, const Basis& u, const Basis& v, Mesh& mesh) {
     for (std::size_t i = 0; i < u.value.size(); ++i) {
       const int row = v.first + static_cast<int>(j);
       const int column = u.first + static_cast<int>(i);
-      const Vec3& p = net.points[static_cast<std::size_t>(row * net.columns + column)];
+      const Vec3& p =
+          net.points[static_cast<std::size_t>(row) * static_cast<std::size_t>(net.columns) +
+                     static_cast<std::size_t>(column)];
       at += u.value[i] * v.value[j] * p;
       along_u += u.slope[i] * v.value[j] * p;
       along_v += u.value[i] * v.slope[j] * p;

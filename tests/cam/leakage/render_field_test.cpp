@@ -102,7 +102,7 @@ TEST(RenderField, APrismShiftsTheLight) {
   const ImagePlane plane(small_setup());
   for (int r = 0; r < 20; ++r) {
     for (int c = 0; c < 20; ++c) {
-      mean += picture.flux[static_cast<std::size_t>(20 * r + c)] *
+      mean += picture.flux[20 * static_cast<std::size_t>(r) + static_cast<std::size_t>(c)] *
               plane.to_mm(Eigen::Vector2d(c + 0.5, r + 0.5));
     }
   }
@@ -249,7 +249,7 @@ TEST(RenderField, ThreeFacesThatMeetThrowThreeSpots) {
   };
   const AnalyticField field([&](const Eigen::Vector2d& p) {
     const int k = face(p);
-    const Eigen::Vector2d slope = slopes[static_cast<std::size_t>(k)];
+    const Eigen::Vector2d& slope = slopes[static_cast<std::size_t>(k)];
     return SurfacePoint{5.0 + slope.dot(p - apex), slope, k};
   });
   const FluxPicture picture = render(field, setup_of(0.05));
@@ -262,8 +262,7 @@ TEST(RenderField, ThreeFacesThatMeetThrowThreeSpots) {
       const Eigen::Vector2d p(0.002 * (i + 0.5), 0.002 * (j + 0.5));
       const SurfacePoint point = field.at(p);
       const Eigen::Vector2d at = land_of(light, p, point.z, point.slope);
-      traced[static_cast<std::size_t>(20 * static_cast<int>(at.y()) + static_cast<int>(at.x()))] +=
-          0.25e-6;
+      traced[20 * static_cast<std::size_t>(at.y()) + static_cast<std::size_t>(at.x())] += 0.25e-6;
     }
   }
   EXPECT_LT(largest_difference(picture.flux, traced), 1.3e-4);

@@ -291,6 +291,7 @@ SurfaceMesh creased_mesh(unsigned seed, double side) {
   std::uniform_real_distribution<double> slope(-0.35, 0.35);
   std::uniform_real_distribution<double> height(0.0, 0.15);
   std::vector<Eigen::Vector3d> planes;
+  planes.reserve(10);
   for (int k = 0; k < 10; ++k) planes.emplace_back(slope(random), slope(random), height(random));
   const auto at = [&](std::size_t k, double x, double y) {
     return planes[k].x() * (x - 0.5 * side) + planes[k].y() * (y - 0.5 * side) + planes[k].z();

@@ -26,7 +26,6 @@ namespace {
 
 using testing::height_field;
 using testing::kSetup;
-using testing::kSize;
 using testing::Random;
 using testing::setup_of;
 

@@ -29,7 +29,8 @@ double dot(const AxisBasis& basis, const std::vector<double>& values,
   double sum = 0.0;
   for (int j = 0; j < basis.taps; ++j) {
     const auto at = static_cast<std::size_t>(basis.taps) * node + static_cast<std::size_t>(j);
-    sum += values[at] * coefficients[static_cast<std::size_t>(basis.first[node] + j)];
+    sum += values[at] *
+           coefficients[static_cast<std::size_t>(basis.first[node]) + static_cast<std::size_t>(j)];
   }
   return sum;
 }
@@ -38,6 +39,7 @@ double dot(const AxisBasis& basis, const std::vector<double>& values,
 std::vector<double> coefficients_of(const AxisLength& along, const std::function<double(double)>& f,
                                     const std::function<double(double)>& f2) {
   std::vector<double> c;
+  c.reserve(static_cast<std::size_t>(along.cells) + 3);
   const double cell = along.length / along.cells;
   for (int i = 0; i < along.cells + 3; ++i) {
     const double t = greville_point(i, along.cells) * cell;
@@ -51,6 +53,7 @@ TEST(AxisBasis, AStraightLineStaysOneToTheRim) {
   const AxisBasis basis =
       made_basis(along, even_points(along.cells, kSamples), {0.06, true, 0.13, 0.0, 1.0});
   std::vector<double> line;
+  line.reserve(static_cast<std::size_t>(along.cells) + 3);
   for (int i = 0; i < along.cells + 3; ++i) line.push_back(3.0 + greville_point(i, along.cells));
   for (std::size_t k = 0; k < static_cast<std::size_t>(basis.nodes()); ++k) {
     EXPECT_NEAR(dot(basis, basis.value, line, k), 3.0 + 0.5 * static_cast<double>(k), 1e-12);
@@ -62,6 +65,7 @@ TEST(AxisBasis, SlopesAreThoseOfTheValues) {
   const AxisLength along{1, 12, 1.0};
   const MadeBy made{0.07, true, 0.11, 0.3, 0.4};
   std::vector<double> c;
+  c.reserve(static_cast<std::size_t>(along.cells) + 3);
   for (int i = 0; i < along.cells + 3; ++i) c.push_back(std::sin(2.1 * i));
   constexpr double kStep = 1e-4;
   for (const double t : {0.3, 1.0, 5.5, 11.2}) {
@@ -150,8 +154,10 @@ TEST(AxisBasis, PlacesInThePlaneAreThoseOfTheSplineItself) {
     std::vector<double> steep = dense;
     const auto spread = [&](const AxisBasis& basis, double sign) {
       for (int j = 0; j < basis.taps; ++j) {
-        const auto at = static_cast<std::size_t>(k * basis.taps + j);
-        const auto i = static_cast<std::size_t>(basis.first[static_cast<std::size_t>(k)] + j);
+        const auto at = static_cast<std::size_t>(k) * static_cast<std::size_t>(basis.taps) +
+                        static_cast<std::size_t>(j);
+        const auto i = static_cast<std::size_t>(basis.first[static_cast<std::size_t>(k)]) +
+                       static_cast<std::size_t>(j);
         dense[i] += sign * basis.plan_value[at];
         steep[i] += sign * basis.plan_slope[at];
       }

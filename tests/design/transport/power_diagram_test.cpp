@@ -77,8 +77,9 @@ void expect_flips_to_agree(const Eigen::Matrix2Xd& sites,
 
 std::vector<Eigen::VectorXd> convex_and_back(const Eigen::Matrix2Xd& sites, Random& random) {
   std::vector<Eigen::VectorXd> weights;
+  weights.reserve(5);
   for (int round = 0; round < 4; ++round) weights.push_back(convex_weights(sites, random));
-  weights.push_back(Eigen::VectorXd::Zero(sites.cols()));
+  weights.emplace_back(Eigen::VectorXd::Zero(sites.cols()));
   return weights;
 }
 
@@ -98,6 +99,7 @@ TEST(RegularTriangulation, FlippedIsAsRebuiltWhereSitesLieOnCirclesAndLines) {
     expect_flips_to_agree(sites, convex_and_back(sites, random));
     // Integer weights: heights are equal or in one plane, to the bit.
     std::vector<Eigen::VectorXd> weights;
+    weights.reserve(20);
     for (int round = 0; round < 20; ++round) {
       weights.emplace_back(Eigen::VectorXd::NullaryExpr(
           sites.cols(), [&] { return 0.25 * random.below(round % 3 + 2); }));
