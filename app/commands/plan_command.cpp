@@ -191,10 +191,7 @@ CommandResult run(CommandFrame& frame, PlanSettings& settings) {
   for (const std::string& change : picture.changes) {
     frame.console().note(joined({settings.target, ": ", change}));
   }
-  for (const std::string& change :
-       read_lamp(wish.design.light, settings.background, frame.control())) {
-    frame.console().note(joined({wish.design.light.source_picture, ": ", change}));
-  }
+  read_lamp(wish.design.light, settings.background, frame.control(), frame.console());
   const std::vector<Proposal> proposals =
       propose(picture.image, wish, frame.executor(), frame.control());
   CommandResult result;

@@ -147,9 +147,7 @@ void require_waves(const Scene& scene, const OptionSet& options, const RenderArg
 void put_lamp(const RenderArguments& arguments, CommandFrame& frame, RenderOptions& render) {
   LightOptions& light = render.light;
   if (light.lamp.empty()) return;
-  for (const std::string& change : read_lamp(light, arguments.background, frame.control())) {
-    frame.console().note("--lamp " + light.source_picture + ": " + change);
-  }
+  read_lamp(light, arguments.background, frame.control(), frame.console());
   put_lamp(light, render.setup);
 }
 

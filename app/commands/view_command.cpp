@@ -77,18 +77,11 @@ std::vector<std::string> warnings_of(const LensView& view) {
   return warnings;
 }
 
-/// Reads the lamp's picture, if it has one.
-void read_shape(LightOptions& light, CommandFrame& frame) {
-  for (const std::string& change : read_lamp(light, Background(), frame.control())) {
-    frame.console().note("--lamp " + light.source_picture + ": " + change);
-  }
-}
-
 CommandResult run(CommandFrame& frame, ViewSettings& settings) {
   require_page_name(settings.out);
   require_replaceable("--out", settings.out, settings.force);
   frame.begin_file(settings.out);
-  read_shape(settings.light.light, frame);
+  read_lamp(settings.light.light, {}, frame.control(), frame.console());
   const LensView view =
       read_view(settings.source, settings.light, frame.executor(), frame.control());
   for (const std::string& note : view.notes) frame.console().note(note);

@@ -98,4 +98,11 @@ void note_unfinished_design(const Lens& lens, const Console& console) {
   console.note("note: the lens's design was interrupted; finish it with design --resume");
 }
 
+void read_lamp(LightOptions& light, const Background& background, const RunControl& control,
+               const Console& console) {
+  for (const std::string& change : lensforge::read_lamp(light, background, control)) {
+    console.note("--lamp " + light.source_picture + ": " + change);
+  }
+}
+
 }  // namespace lensforge::app

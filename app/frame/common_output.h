@@ -11,6 +11,7 @@
 #include "core/image/image.h"
 #include "core/lens/lens.h"
 #include "design/render.h"
+#include "design/setup/design_options.h"
 
 /// Texts and JSON that several commands print.
 namespace lensforge::app {
@@ -53,5 +54,10 @@ std::string seal_words(const std::optional<bool>& holds);
 
 /// Prints a note if the design of the lens was interrupted.
 void note_unfinished_design(const Lens& lens, const Console& console);
+
+/// Reads the picture of `--lamp`, if it has one, and prints what was changed in it.
+/// @throw InputError; Interrupted.
+void read_lamp(LightOptions& light, const Background& background, const RunControl& control,
+               const Console& console);
 
 }  // namespace lensforge::app

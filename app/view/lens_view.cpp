@@ -294,7 +294,7 @@ std::string words_of(const OtherLight& light) {
 }
 
 /// Shows a view's surfaces in another light, and nothing that is known only in the lens's own. How
-/// well they are stored stays as found in that.
+/// well they are stored stays as found in that. @pre the designed surface comes first
 void relight(const OtherLight& light, Lens lens, const CutForecast& forecast,
              const Executor& executor, const RunControl& control, LensView& view) {
   put_light(light, lens.setup);
@@ -302,12 +302,11 @@ void relight(const OtherLight& light, Lens lens, const CutForecast& forecast,
   view.other_light = words_of(light);
   view.leakage_map.clear();
   for (ViewedSurface& viewed : view.surfaces) {
-    Lens shown = lens;
     if (viewed.id != "designed") {
-      shown.spline = viewed.id == "part" ? forecast.part : forecast.polished;
-      shown.model = SurfaceModel::kSpline;
+      lens.spline = viewed.id == "part" ? forecast.part : forecast.polished;
+      lens.model = SurfaceModel::kSpline;
     }
-    evaluate(shown, shown.model, &viewed.picture, executor, Look::kBrief, control);
+    evaluate(lens, lens.model, &viewed.picture, executor, Look::kBrief, control);
   }
   std::erase_if(view.causes, [](const ViewedCause& step) { return step.surface.empty(); });
   for (ViewedCause& step : view.causes) {

@@ -20,8 +20,8 @@ namespace {
 
 /// Nodes along either side of the blocks that are cut together; 16 is fastest on the benchmark's
 /// raster at 10 µm (MilledNodes).
-constexpr std::int64_t kNodesOfBlock = 16;
-constexpr std::size_t kBlockNodes = kNodesOfBlock * kNodesOfBlock;
+constexpr std::int64_t kCutBlockSide = 16;
+constexpr std::size_t kBlockNodes = kCutBlockSide * kCutBlockSide;
 
 /// Side of the cells that spans are sorted into, in radii.
 constexpr double kCellPerRadius = 0.5;
@@ -108,7 +108,7 @@ struct MilledField::NodeRange {
 struct MilledField::Block {
   std::int64_t column = 0, row = 0;  ///< First node, in the window.
   std::int64_t columns = 0, rows = 0;
-  std::array<double, kNodesOfBlock> x{}, y{};
+  std::array<double, kCutBlockSide> x{}, y{};
   std::array<double, kBlockNodes> z{};
   std::array<std::int32_t, kBlockNodes> move{};  ///< −1: the blank's top.
   std::array<std::int32_t, kBlockNodes> path{};
@@ -121,16 +121,16 @@ struct MilledField::Block {
   std::array<double, kBlockNodes> plane{};
 
   Block(const GridWindow& window, std::int64_t block, double blank_top) {
-    const std::int64_t across = (window.columns + kNodesOfBlock - 1) / kNodesOfBlock;
-    column = block % across * kNodesOfBlock;
-    row = block / across * kNodesOfBlock;
-    columns = std::min(kNodesOfBlock, window.columns - column);
-    rows = std::min(kNodesOfBlock, window.rows - row);
+    const std::int64_t across = (window.columns + kCutBlockSide - 1) / kCutBlockSide;
+    column = block % across * kCutBlockSide;
+    row = block / across * kCutBlockSide;
+    columns = std::min(kCutBlockSide, window.columns - column);
+    rows = std::min(kCutBlockSide, window.rows - row);
     for (std::int64_t i = 0; i < columns; ++i) x[index_of(i)] = window.x(column + i);
     for (std::int64_t j = 0; j < rows; ++j) y[index_of(j)] = window.y(row + j);
     z.fill(-kUncut);  // Beyond the window: never the highest.
     for (std::int64_t j = 0; j < rows; ++j) {
-      const auto begin = z.begin() + j * kNodesOfBlock;
+      const auto begin = z.begin() + j * kCutBlockSide;
       std::fill(begin, begin + columns, blank_top);
     }
     move.fill(-1);
@@ -146,7 +146,7 @@ struct MilledField::Block {
     touch = gradient * (radius / secant);
     for (std::int64_t j = 0; j < rows; ++j) {
       for (std::int64_t i = 0; i < columns; ++i) {
-        plane[index_of(j * kNodesOfBlock + i)] = plane_at(x[index_of(i)], y[index_of(j)]);
+        plane[index_of(j * kCutBlockSide + i)] = plane_at(x[index_of(i)], y[index_of(j)]);
       }
     }
   }
@@ -219,12 +219,12 @@ struct MilledField::Block {
   /// `below(across, along, room, height)` computes it for the nodes of a line, as in GraphArc.
   template <class Below>
   void cut_lines(bool along_x, const NodeRange& range, std::int32_t by, const Below& below) {
-    using Line = Eigen::Array<double, Eigen::Dynamic, 1, Eigen::ColMajor, kNodesOfBlock, 1>;
+    using Line = Eigen::Array<double, Eigen::Dynamic, 1, Eigen::ColMajor, kCutBlockSide, 1>;
     const auto& [nodes, lines] =
         along_x ? std::tie(range.columns, range.rows) : std::tie(range.rows, range.columns);
     const auto& [at, across] = along_x ? std::tie(x, y) : std::tie(y, x);
-    const std::int64_t step = along_x ? 1 : kNodesOfBlock;
-    const std::int64_t line_step = along_x ? kNodesOfBlock : 1;
+    const std::int64_t step = along_x ? 1 : kCutBlockSide;
+    const std::int64_t line_step = along_x ? kCutBlockSide : 1;
     const Eigen::Map<const Eigen::ArrayXd> along(at.data() + nodes.first,
                                                  nodes.second - nodes.first);
     Line room(along.size());
@@ -260,7 +260,7 @@ struct MilledField::Block {
       for (std::int64_t i = range.columns.first; i < range.columns.second; ++i) {
         const double qx = x[index_of(i)];
         const double qy = y[index_of(j)];
-        offer(index_of(j * kNodesOfBlock + i),
+        offer(index_of(j * kCutBlockSide + i),
               ball_below(sweep.centre(radius, qx, qy), radius, qx, qy), by);
       }
     }
@@ -421,7 +421,7 @@ void MilledField::write_block(const Block& block, SurfacePatch& patch) const {
   MoveSlopes slopes(paths_);
   for (std::int64_t j = 0; j < block.rows; ++j) {
     for (std::int64_t i = 0; i < block.columns; ++i) {
-      const std::size_t from = index_of(j * kNodesOfBlock + i);
+      const std::size_t from = index_of(j * kCutBlockSide + i);
       const std::size_t to = index_of((block.row + j) * patch.window.columns + block.column + i);
       patch.z[to] = block.z[from];
       Eigen::Vector2d slope = Eigen::Vector2d::Zero();
@@ -442,8 +442,8 @@ void MilledField::write_block(const Block& block, SurfacePatch& patch) const {
 void MilledField::sample(const GridWindow& window, const Executor& executor,
                          SurfacePatch& patch) const {
   resize_patch(window, true, patch);
-  const std::int64_t across = (window.columns + kNodesOfBlock - 1) / kNodesOfBlock;
-  const std::int64_t blocks = across * ((window.rows + kNodesOfBlock - 1) / kNodesOfBlock);
+  const std::int64_t across = (window.columns + kCutBlockSide - 1) / kCutBlockSide;
+  const std::int64_t blocks = across * ((window.rows + kCutBlockSide - 1) / kCutBlockSide);
   const auto cut = [&](std::int64_t b) {
     Block block(window, b, blank_top_);
     for (std::size_t path = 0; path < paths_.size(); ++path) cut_block(path, block);

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kLinesBetweenStops = 4096;
+constexpr std::int64_t kCheckedLinesPerReport = 4096;
 
 /// Reads a program and rebuilds what BlockWriter noted.
 class PartReading {
@@ -126,7 +126,7 @@ WrittenProgram check_part(const ProgramContext& context, const ProgramPart& part
     // The observer may take long for a line.
     if (control.stop_requested()) throw Interrupted();
     reading.take(line);
-    if (line.block.line % kLinesBetweenStops != 0) return;
+    if (line.block.line % kCheckedLinesPerReport != 0) return;
     control.report({stage, static_cast<double>(line.block.line),
                     static_cast<double>(part.text().lines()), ""});
   };

@@ -9,7 +9,7 @@
 namespace lensforge {
 namespace {
 
-constexpr std::int64_t kLinesOfAReport = 1 << 14;
+constexpr std::int64_t kLinesPerReport = 1 << 14;
 
 /// Straight down, but for what rounding makes of it, mm.
 constexpr double kStraight = 1e-6;
@@ -28,7 +28,7 @@ class Examiner {
       if (!text) break;
       facts_.lines = text->line;
       take(*text);
-      if (text->line % kLinesOfAReport != 0) continue;
+      if (text->line % kLinesPerReport != 0) continue;
       if (control.stop_requested()) throw Interrupted();
       control.report({"reading the program", static_cast<double>(text->next_offset), 0.0,
                       "line " + std::to_string(text->line)});
