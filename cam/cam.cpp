@@ -172,21 +172,20 @@ double memory_per_move(const FinishProcess& finish) {
 
 double nodes_of(const Eigen::Vector2d& size) { return size.prod() / (kMeshSpacing * kMeshSpacing); }
 
-/// Parts predicted with errors, times the nodes of each.
-double drawn_parts(const CamOptions& options) {
-  if (options.tolerances == 0) return 0.0;
-  const auto parts = static_cast<double>(options.tolerances);
-  return 1.0 + parts +
-         static_cast<double>(kErrorCauses) * static_cast<double>(paired_parts(options.tolerances));
-}
-
+/// Nodes of a part with errors; 0 if none is drawn.
 double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
+  if (part_draws(options, setup).parts == 0) return 0.0;
   PartPlan plan;
   plan.optics = setup;
   plan.passes = planned_passes(options, setup);
   plan.polish = options.workshop.polish;
   plan.apron = apron_to_cut(options);
-  return options.tolerances > 0 ? static_cast<double>(part_nodes(plan)) : 0.0;
+  return static_cast<double>(part_nodes(plan));
+}
+
+/// Nodes of all pictures of parts with errors.
+double drawn_nodes(const CamOptions& options, const OpticalSetup& setup) {
+  return static_cast<double>(part_draws(options, setup).pictures()) * part_nodes(options, setup);
 }
 
 /// Comparisons are written so that NaN is refused too.
@@ -214,7 +213,7 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   estimate.seconds =
       (length * seconds_per_mm(options) + points * kSecondsPerPoint +
        samples_of(options, setup) * kSecondsPerSample + seconds_by_waves(options, setup) +
-       drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode) /
+       drawn_nodes(options, setup) * kSecondsPerPartNode) /
       threads;
   estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
   estimate.memory_bytes = kMemory;
@@ -249,8 +248,7 @@ void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,
   if (options.render && nodes_of(size) * kMemoryPerNode > moves * memory_per_move(finish)) {
     return require("the milled surface of so large a lens", "--no-render needs less");
   }
-  if (drawn_parts(options) * part_nodes(options, setup) * kSecondsPerPartNode >
-      0.5 * on_one_core.seconds) {
+  if (drawn_nodes(options, setup) * kSecondsPerPartNode > 0.5 * on_one_core.seconds) {
     return require("--tolerances " + std::to_string(options.tolerances),
                    "fewer parts, --tolerances 200, would fit");
   }

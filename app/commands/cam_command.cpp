@@ -156,7 +156,7 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
     if (report.places_matter()) {
       for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
     }
-    if (!report.tolerances.empty()) text += "  " + tolerance_words(report.tolerances) + "\n";
+    if (!report.tolerances.empty()) text += "  " + report.range_words() + "\n";
   }
   return text + verdict_text(report.verdict) + z_text(report.z_offset);
 }

@@ -39,8 +39,13 @@ CommandResult run(CommandFrame& frame, StudioSettings& settings) {
   frame.begin();
   {
     const Studio studio(settings.folder, settings.port, common_words(frame.options().common()));
-    frame.console().note("the studio is at " + studio.address());
-    frame.console().begin();
+    const Console& console = frame.console();
+    if (frame.options().common().quiet) {
+      console.result({{"address", studio.address()}}, studio.address() + "\n");
+    } else {
+      console.note("the studio is at " + studio.address());
+      console.begin();
+    }
     std::mutex mutex;
     std::condition_variable_any never;
     std::unique_lock lock(mutex);

@@ -34,6 +34,8 @@
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 #include "design/schedule/levels.h"
+#include "machine/send.h"
+#include "machine/stream/journal.h"
 
 namespace lensforge::app {
 namespace {
@@ -56,8 +58,6 @@ constexpr const char* kEvents = "events.jsonl";
 /// Longest side of the picture that a page shows and crops, pixels.
 constexpr int kPreviewSide = 1024;
 constexpr std::size_t kLongestName = 40;
-/// Parts of the forecast's range: their P10 and P90 are good to a tenth of the range.
-constexpr int kParts = 12;
 /// End of the events file that is read for what was said last, bytes.
 constexpr std::streamoff kEventsTail = 65536;
 constexpr std::size_t kMessages = 6;
@@ -270,6 +270,15 @@ void Project::require_idle() const {
   }
 }
 
+fs::path Project::move_to(const fs::path& bin) {
+  require_idle();
+  if (sending()) throw InputError("a program is being sent; end the job first");
+  fs::create_directories(bin);
+  const fs::path place = free_folder(bin, folder_.filename().string());
+  fs::rename(folder_, place);
+  return place;
+}
+
 void Project::require_picture() const {
   if (!fs::is_regular_file(folder_ / kPicture)) {
     throw InputError("there is no picture yet; crop and tone it, or take it as it is");
@@ -354,7 +363,6 @@ Arguments Project::words_of(const std::string& step, const std::string& format) 
     if (fs::is_regular_file(folder_ / kWorkshop)) add({"--workshop", kWorkshop});
     // The programs that send takes, unless the workshop states its own.
     if (!record_["workshop"].contains("machine.post")) add({"--post", "grbl"});
-    if (range_fault().empty()) add({"--tolerances", std::to_string(kParts)});
   } else if (step == "view") {
     words.push_back(lens_name());
     add({"--out", lens_name() + "/" + kView});
@@ -646,7 +654,7 @@ json Project::part_json(const std::string& address) const {
   return {{"mae", last.value("mae", 0.0)},
           {"model", waves ? "waves" : "rays"},
           {"range", range},
-          {"range_words", "No range: cam --tolerances " + range_fault() + "."},
+          {"range_words", "No range: cam " + range_fault() + "."},
           {"leakage", by["leakage"].value("share", 0.0)},
           {"contrast", by["leakage"].value("contrast", json())},
           {"minutes", report.value("minutes", 0.0)},
@@ -691,6 +699,19 @@ json Project::tool_json(const json& position, const fs::path& program) const {
   return {share(0), 1.0 - share(1)};
 }
 
+namespace {
+
+/// True if a job of this program was begun and not ended: `send` wants to be told how to go on.
+bool is_unfinished(const fs::path& program) {
+  try {
+    return !read_journal(SendOptions().journal_of(program)).finished;
+  } catch (const InputError&) {
+    return false;  // There is none.
+  }
+}
+
+}  // namespace
+
 json Project::cut_json(const std::string& address) const {
   if (!cut_) return nullptr;
   json cut = cut_->state();
@@ -715,6 +736,8 @@ json Project::cut_json(const std::string& address) const {
     cut[key] = last.value(key, json());
   }
   cut["tool"] = tool_json(cut["position"], words[1]);
+  const bool simulated = words[3].starts_with("sim:");
+  cut["unfinished"] = !simulated && !sending() && is_unfinished(folder_ / words[1]);
   const std::size_t from = messages.size() - std::min(messages.size(), kMessages);
   cut["messages"] = std::vector<std::string>(messages.begin() + static_cast<std::ptrdiff_t>(from),
                                              messages.end());

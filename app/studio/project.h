@@ -53,6 +53,10 @@ class Project {
   void undo() { step_version(-1); }
   void redo() { step_version(1); }
 
+  /// Moves the project's folder into `bin`, which is made if there is none; then this is not usable.
+  /// @return where it is. @throw InputError if something of it runs.
+  [[nodiscard]] std::filesystem::path move_to(const std::filesystem::path& bin);
+
   /// A file of the project. @param path  relative. @throw NotFound unless it is a regular file in
   /// the folder, not hidden.
   [[nodiscard]] std::filesystem::path file(std::string_view path) const;
@@ -75,7 +79,7 @@ class Project {
   [[nodiscard]] bool computing() const { return job_ && job_->running(); }
   [[nodiscard]] bool sending() const { return cut_ && cut_->running(); }
 
-  /// Why `cam --tolerances` does not take the lens; empty if it does.
+  /// Why `cam` has no range for the lens; empty if it has.
   [[nodiscard]] std::string range_fault() const;
   [[nodiscard]] Arguments words_of(const std::string& step, const std::string& format) const;
   [[nodiscard]] Arguments setting_words(bool of_plan) const;

@@ -34,6 +34,8 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kKeyFile = ".key";
+/// Folder of removed projects.
+constexpr const char* kRemoved = ".removed";
 /// A photograph of 100 megapixels, and a TIFF of 50.
 constexpr std::size_t kMaxBody = 200'000'000;
 /// A program of some million lines.
@@ -220,6 +222,11 @@ class Studio::Content {
     if (path.size() == 1) return created(request);
     if (path.size() != 3) throw NotFound{"no such page"};
     Project& project = project_of(path[1]);
+    if (path[2] == "remove") {
+      const fs::path place = project.move_to(folder_ / kRemoved);
+      projects_.erase(std::string(path[1]));
+      return json_answer({{"moved_to", place.string()}});
+    }
     act(project, path[2], request.body);
     return json_answer(project.state(address_of(path[1])));
   }

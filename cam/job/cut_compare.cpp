@@ -131,6 +131,7 @@ std::vector<Choice> combinations(const CamOptions& options, const CutChoices& ch
   base.workshop.process.semi.enabled = false;
   base.render = true;
   base.remedies = false;
+  base.range = false;
   std::vector<Choice> all;
   for (const Setting& setting : settings_of(base.workshop, choices)) {
     Choice choice{name_of(setting, choices), base};

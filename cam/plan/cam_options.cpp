@@ -226,10 +226,7 @@ std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup
     return "draws parts of one finishing ball only: set finish.large_tool = 0";
   }
   if (setup.outline) return "draws parts of rectangular lenses only";
-  // Parts have the error of an extended source where the design assumes a point.
-  if (!setup.extent.none() || setup.front) {
-    return "draws parts with a flat front, for the light of a point or of one direction only";
-  }
+  if (setup.front) return "draws parts with a flat front only";
   return "";
 }
 
@@ -428,11 +425,12 @@ void describe_prediction(Description& d, CamOptions& o, const Description& shop)
       "is much wider than diffraction, or the surface has creases");
   d.number("--wavelength", o.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength), "nm",
            "of the waves; white light is as 550");
-  d.whole("--tolerances", o.tolerances,
-          Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
-          "how sure the forecast is: predict so many parts with the errors of the workshop's "
-          "[tolerances]; 0: none")
+  d.whole(
+       "--tolerances", o.tolerances, Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
+       "how sure the forecast is, and what matters: predict so many parts with the errors of the "
+       "workshop's [tolerances]; 0: a few, for the range")
       .essential = true;
+  d.without("--no-range", o.range, "no range of parts with errors beside the forecast");
   d.whole("--tolerance-seed", o.tolerance_seed, Limits::between(0, cam_limit::kLargestSeed),
           "seed of the random numbers of --tolerances");
   d.like(shop.at("polish.sigma"), "--polish-sigma",

@@ -71,6 +71,7 @@ struct CamOptions {
   bool render = true;    ///< Compute the picture of the part; else programs only.
   bool remedies = true;  ///< Try remedies where most light leaks, if the picture is computed.
   int tolerances = 0;    ///< Number of parts drawn with errors (Workshop::tolerances), 0 or ≥ 10.
+  bool range = true;     ///< Without `tolerances`, draw a few where it can be done, for the range.
   int tolerance_seed = 1;  ///< Of the random numbers for drawing them, ≥ 0.
   /// Of the rendered surface, mm, 0.001 … 1; 0: the larger of a sixth of the pitch and a third of
   /// the polish's σ.

@@ -596,11 +596,10 @@ PartPlan part_plan(const CutSetup& setup, const Haze& haze) {
       setup.apron_on_lens(), haze};
 }
 
-/// Draws CamOptions::tolerances parts with the workshop's errors and predicts them.
-/// @throw Interrupted
-ToleranceForecast draw_parts(const CutSetup& setup, const PartSurfaces& surfaces,
-                             const Prediction& prediction, const Executor& executor,
-                             const RunControl& control) {
+/// Draws parts with the workshop's errors and predicts them. @throw Interrupted
+ToleranceForecast draw_parts(const CutSetup& setup, const PartDraws& draws,
+                             const PartSurfaces& surfaces, const Prediction& prediction,
+                             const Executor& executor, const RunControl& control) {
   const CamOptions& options = setup.options;
   const Lens& lens = *setup.lens;
   const PartPlan plan = part_plan(setup, prediction.haze);
@@ -608,10 +607,19 @@ ToleranceForecast draw_parts(const CutSetup& setup, const PartSurfaces& surfaces
   const ErrorSource source{options.workshop.tolerances, lens.setup.lens_size, plan.passes,
                            static_cast<std::uint64_t>(options.tolerance_seed)};
   const PictureJudge judge(lens.target, prediction.leakage.designed.picture, options.leakage);
-  return forecast_parts(model, source, judge, options.tolerances, executor, control);
+  return forecast_parts(model, source, judge, draws, executor, control);
 }
 
+/// Parts for the range alone, whose ends are then good to a tenth of it.
+constexpr int kRangeParts = 12;
+
 }  // namespace
+
+PartDraws part_draws(const CamOptions& options, const OpticalSetup& setup) {
+  if (options.tolerances > 0) return ranking_draws(options.tolerances);
+  const bool drawn = options.range && options.render && tolerance_fault(options, setup).empty();
+  return {drawn ? kRangeParts : 0, 0};
+}
 
 Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const CutSurfaces& cut,
                        const Executor& executor, const RunControl& control) {
@@ -622,8 +630,9 @@ Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const Cut
     try_remedies({setup, passes, surfaces.part(), prediction.judged(), prediction.light},
                  prediction.places, executor, control);
   }
-  if (options.tolerances > 0) {
-    prediction.tolerances = draw_parts(setup, surfaces, prediction, executor, control);
+  const PartDraws draws = part_draws(options, setup.lens->setup);
+  if (draws.parts > 0) {
+    prediction.tolerances = draw_parts(setup, draws, surfaces, prediction, executor, control);
   }
   return prediction;
 }

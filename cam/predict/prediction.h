@@ -59,6 +59,10 @@ inline constexpr double kMeshSpacing = 0.1;
 Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const Executor& executor,
                         const RunControl& control);
 
+/// The parts with errors that CamOptions::tolerances asks for, or a few for their range; none where
+/// they cannot be drawn.
+PartDraws part_draws(const CamOptions& options, const OpticalSetup& setup);
+
 /// A predicted cut, for trying its places again.
 struct TrialSite {
   const CutSetup& setup;

@@ -174,7 +174,7 @@ struct ReportData {
   Body body;                            ///< Of the part, or of the cast from a mould.
   double ghost = 0.0;                   ///< ghost_share(); 0 if no light passes the part.
   ToleranceForecast tolerances;         ///< Empty unless requested.
-  std::string tolerance_hint;           ///< How to get it, where it was not requested.
+  std::string tolerance_hint;           ///< How to get it, or one that ranks its causes.
   std::vector<LeakPlace> places;        ///< Worst first.
   Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm
 
@@ -208,6 +208,11 @@ struct ReportData {
   /// The blurs alone.
   [[nodiscard]] std::string blurs_words() const;
   /// By what the part is judged.
+  /// tolerance_words(), and that waves are left out of it where the part is judged by them.
+  [[nodiscard]] std::string range_words() const {
+    return tolerance_words(tolerances) +
+           (waves ? " These are of rays; diffraction, the same in all parts, is left out." : "");
+  }
   [[nodiscard]] const LeakageResult& judged() const { return waves ? waves->result : leakage; }
   /// The lit part: "lens", or the cast from the mould.
   [[nodiscard]] std::string lit_part() const {

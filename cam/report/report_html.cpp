@@ -111,7 +111,7 @@ std::string headline(const Verdict& verdict) {
 /// The range of parts, or how to get it; empty where it cannot be had.
 std::string spread_of_parts(const ReportData& data) {
   if (!data.tolerances.empty()) {
-    return element("p", "", escape_html(tolerance_words(data.tolerances)));
+    return element("p", "", escape_html(data.range_words()));
   }
   if (data.tolerance_hint.empty()) return "";
   return element(

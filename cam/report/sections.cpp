@@ -624,6 +624,21 @@ std::string gain_table(const ToleranceForecast& forecast) {
   return stacked(columns, rows);
 }
 
+/// The causes, or the command that ranks them.
+std::string what_matters(const ToleranceForecast& forecast, const std::string& command) {
+  if (forecast.causes.empty()) {
+    return element("p", "class=\"soft\"",
+                   "Which error matters most, and the range by more parts: " +
+                       element("code", "", escape_html(command)) +
+                       ", with the other options as now.");
+  }
+  const std::string words =
+      "“Known to” is the standard error of the mean over " + count_text(forecast.paired) +
+      " of the parts, drawn again with half of each cause and all else the same.";
+  return element("h3", "style=\"margin-top:1.2rem\"", "What matters") + gain_table(forecast) +
+         element("p", "class=\"soft\"", escape_html(words));
+}
+
 std::string spread_figure(const ToleranceForecast& forecast) {
   const double top = scale_top(forecast.deviation);
   const ColorImage picture =
@@ -644,17 +659,12 @@ std::string tolerances(const ReportData& data) {
   const std::string words = "Drawn: " + count_text(forecast.parts) +
                             " parts with random errors of machine, tool, polish, " +
                             "material and light, as the workshop’s [tolerances] state them (seed " +
-                            std::to_string(forecast.seed) + "). To tell what matters, " +
-                            count_text(forecast.paired) +
-                            " of them were drawn again with half of each cause and all else the "
-                            "same; “known to” is the " +
-                            "standard error of that mean.";
+                            std::to_string(forecast.seed) + ").";
   return element("section", "",
                  element("h2", "", "How sure is the forecast") +
-                     element("p", "", element("b", "", escape_html(tolerance_words(forecast)))) +
+                     element("p", "", element("b", "", escape_html(data.range_words()))) +
                      quantile_table(forecast, data.leakage.part().quality) +
-                     element("h3", "style=\"margin-top:1.2rem\"", "What matters") +
-                     gain_table(forecast) +
+                     what_matters(forecast, data.tolerance_hint) +
                      element("div", "class=\"maps\"", spread_figure(forecast)) +
                      element("p", "class=\"soft\"", escape_html(words)));
 }

@@ -19,6 +19,7 @@
 #include "core/mesh/surface_mesh.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
+#include "design/render/source_picture.h"
 
 // Notation: θ = k · spacing, the phase from one node to the next; a wave of n nodes has 2π / n.
 
@@ -729,18 +730,20 @@ PartModel::PartModel(const SurfaceField& cut, const PartPlan& plan, const Execut
       lit_(light_nodes(base_)) {}
 
 FluxPicture PartModel::render(const PartError& error, const Executor& executor) const {
-  FluxPicture picture = clear(error, executor);
+  const OpticalSetup& optics = plan_.optics;
+  const auto sharp = [&](const OpticalSetup& point) { return clear(error, point, executor).flux; };
+  const std::vector<double> flux = picture_by_convolution(optics, mean_height_, sharp, executor);
   const Haze haze = plan_.haze.times(error.roughness_factor);
-  picture.flux = hazed(haze, picture.flux, plan_.optics.pixels, executor);
-  return picture;
+  return {optics.pixels.x(), optics.pixels.y(), hazed(haze, flux, optics.pixels, executor)};
 }
 
-/// The picture without haze.
-FluxPicture PartModel::clear(const PartError& error, const Executor& executor) const {
+/// The picture in the light of a point, without haze.
+FluxPicture PartModel::clear(const PartError& error, const OpticalSetup& optics,
+                             const Executor& executor) const {
   const Passes& passes = plan_.passes;
   const double sigma = std::min(plan_.polish.sigma * error.sigma_factor, plan_.largest_sigma);
   const PolishTransfer polish{sigma, plan_.polish.order, plan_.polish.floor};
-  const PartLight light(plan_.optics, error);
+  const PartLight light(optics, error);
   const ErrorHeights heights(base_, error, passes, polish);
   const Ripple ripple(passes, passes.ball_radius + error.radius, polish);
   const auto axis = [&](int k) {
@@ -757,17 +760,17 @@ FluxPicture PartModel::clear(const PartError& error, const Executor& executor) c
                   ripple,
                   plan_.polish,
                   {axis(0), axis(1)},
-                  plan_.optics.lens_size,
+                  optics.lens_size,
                   0,
                   light.whole(lit_),
                   light.source_radii(error.source, mean_height_)};
-  if (scene.source.isZero()) return cropped(render_tiles(scene, plan_.optics.pixels, executor), 0);
-  const Eigen::Vector2d& size = plan_.optics.lens_size;
+  if (scene.source.isZero()) return cropped(render_tiles(scene, optics.pixels, executor), 0);
+  const Eigen::Vector2d& size = optics.lens_size;
   const Eigen::Vector3d middle(0.5 * size.x(), 0.5 * size.y(), mean_height_);
-  const Eigen::Vector2d scale = plan_.optics.pixels.cast<double>().cwiseQuotient(size);
+  const Eigen::Vector2d scale = optics.pixels.cast<double>().cwiseQuotient(size);
   const BlurKernel blur = disc_blur(blur_radii(scene, scale, middle));
   scene.margin = blur.reach;
-  const FluxRaster raster = render_tiles(scene, plan_.optics.pixels, executor);
+  const FluxRaster raster = render_tiles(scene, optics.pixels, executor);
   return cropped(blurred(raster, blur, executor), blur.reach);
 }
 

@@ -108,7 +108,8 @@ struct PartPlan {
 /// Polishing removes everything finer than its σ except the scallops' ripple. So the heights
 /// without scallops (BaseHeights), changed by the part's errors (ErrorHeights), are polished on a
 /// grid as coarse as σ allows; the ripple (Ripple) is added where rays land, with four nodes per
-/// pitch, and the source blurs the picture. The PartModel.* tests compare it with cam's own chain
+/// pitch, and the source's error blurs the picture. A lamp with a width blurs it by
+/// picture_by_convolution(). The PartModel.* tests compare it with cam's own chain
 /// of surfaces.
 class PartModel {
  public:
@@ -124,7 +125,8 @@ class PartModel {
   [[nodiscard]] const PartPlan& plan() const { return plan_; }
 
  private:
-  [[nodiscard]] FluxPicture clear(const PartError& error, const Executor& executor) const;
+  [[nodiscard]] FluxPicture clear(const PartError& error, const OpticalSetup& optics,
+                                  const Executor& executor) const;
 
   PartPlan plan_;
   BaseHeights base_;

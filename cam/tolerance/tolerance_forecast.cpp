@@ -52,21 +52,17 @@ class Draws {
         const Executor& executor, const RunControl& control)
       : model_(model), source_(source), judge_(judge), executor_(executor), control_(control) {}
 
-  ToleranceForecast run(std::int64_t parts) {
+  ToleranceForecast run(const PartDraws& draws) {
     const Clock::time_point start = Clock::now();
     ToleranceForecast forecast;
-    forecast.parts = parts;
-    forecast.paired = paired_parts(parts);
+    forecast.parts = draws.parts;
+    forecast.paired = draws.paired;
     forecast.seed = source_.seed;
-    total_ = static_cast<double>(1 + parts + forecast.paired * std::int64_t{kErrorCauses});
+    total_ = static_cast<double>(draws.pictures());
     forecast.has_dark = judge_.dark_pixels() > 0;
     forecast.nominal = figures(predict({}));
     draw_all(forecast);
-    for (const ErrorCause cause : error_causes()) {
-      forecast.causes.push_back(halve(cause, forecast.paired));
-    }
-    std::stable_sort(forecast.causes.begin(), forecast.causes.end(),
-                     [](const CauseEffect& a, const CauseEffect& b) { return a.mae < b.mae; });
+    if (draws.paired > 0) rank_causes(forecast);
     forecast.seconds = std::chrono::duration<double>(Clock::now() - start).count();
     return forecast;
   }
@@ -103,6 +99,14 @@ class Draws {
     forecast.mae = of([](const PartFigures& f) { return f.mae; });
     forecast.leakage = of([](const PartFigures& f) { return f.leakage; });
     forecast.contrast = of([](const PartFigures& f) { return f.contrast(); });
+  }
+
+  void rank_causes(ToleranceForecast& forecast) {
+    for (const ErrorCause cause : error_causes()) {
+      forecast.causes.push_back(halve(cause, forecast.paired));
+    }
+    std::stable_sort(forecast.causes.begin(), forecast.causes.end(),
+                     [](const CauseEffect& a, const CauseEffect& b) { return a.mae < b.mae; });
   }
 
   CauseEffect halve(ErrorCause cause, std::int64_t pairs) {
@@ -169,14 +173,18 @@ Quantiles quantiles(std::vector<double> values) {
   return {at(0.1), at(0.5), at(0.9)};
 }
 
-std::int64_t paired_parts(std::int64_t parts) {
-  return std::min(parts, std::clamp(parts / kPartsPerPair, kMinPaired, kMaxPaired));
+std::int64_t PartDraws::pictures() const {
+  return 1 + parts + paired * std::int64_t{kErrorCauses};  // One is without errors.
+}
+
+PartDraws ranking_draws(std::int64_t parts) {
+  return {parts, std::min(parts, std::clamp(parts / kPartsPerPair, kMinPaired, kMaxPaired))};
 }
 
 ToleranceForecast forecast_parts(const PartModel& model, const ErrorSource& source,
-                                 const PictureJudge& judge, std::int64_t parts,
+                                 const PictureJudge& judge, const PartDraws& draws,
                                  const Executor& executor, const RunControl& control) {
-  return Draws(model, source, judge, executor, control).run(parts);
+  return Draws(model, source, judge, executor, control).run(draws);
 }
 
 double contrast_with_half(const ToleranceForecast& forecast, const CauseEffect& effect) {
@@ -191,7 +199,8 @@ std::string tolerance_words(const ToleranceForecast& forecast) {
   }
   words +=
       "an MAE of " + decimal_text(forecast.mae.p10, 4) + " to " + decimal_text(forecast.mae.p90, 4);
-  return words + ". " + most_words(forecast);
+  words += ".";
+  return forecast.causes.empty() ? words : words + " " + most_words(forecast);
 }
 
 }  // namespace lensforge

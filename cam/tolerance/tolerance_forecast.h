@@ -68,7 +68,7 @@ struct ToleranceForecast {
   std::uint64_t seed = 0;
   PartFigures nominal;  ///< Of the part without any error, by the same model.
   Quantiles mae, leakage, contrast;
-  std::vector<CauseEffect> causes;  ///< Largest gain of MAE first.
+  std::vector<CauseEffect> causes;  ///< Largest gain of MAE first; empty if they are not ranked.
   std::vector<double> deviation;    ///< PictureSpread::deviation()
   int columns = 0;
   int rows = 0;
@@ -78,17 +78,26 @@ struct ToleranceForecast {
   [[nodiscard]] bool empty() const { return parts == 0; }
 };
 
-/// Number of parts drawn again for every cause, of `parts` in all: a twentieth, 5 to 20.
-std::int64_t paired_parts(std::int64_t parts);
+/// Number of parts to draw, and of those to draw again for every cause.
+struct PartDraws {
+  std::int64_t parts = 0;
+  std::int64_t paired = 0;
+
+  /// Pictures to predict.
+  [[nodiscard]] std::int64_t pictures() const;
+};
+
+/// Draws that rank the causes: a twentieth of the parts, 5 to 20, are drawn again for each.
+PartDraws ranking_draws(std::int64_t parts);
 
 /// Draws parts and predicts them. Same bits for any number of threads.
-/// @param parts  ≥ 1. @throw Interrupted
+/// @pre there is a part. @throw Interrupted
 ToleranceForecast forecast_parts(const PartModel& model, const ErrorSource& source,
-                                 const PictureJudge& judge, std::int64_t parts,
+                                 const PictureJudge& judge, const PartDraws& draws,
                                  const Executor& executor, const RunControl& control);
 
-/// The forecast in a sentence or two: "8 of 10 parts should have a contrast of 20 : 1 to 35 : 1 and
-/// an MAE of 0.0102 to 0.0151. …"
+/// The forecast in a sentence, and what matters most if that is known: "8 of 10 parts should have a
+/// contrast of 20 : 1 to 35 : 1 and an MAE of 0.0102 to 0.0151. …"
 std::string tolerance_words(const ToleranceForecast& forecast);
 
 /// The contrast that halving a cause would bring to the median part.

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <variant>
+#include <vector>
 
 #include "core/optics/front.h"
 #include "core/optics/refraction.h"
@@ -127,18 +128,45 @@ LightPath light_inside(const SurfaceMesh& mesh, const MeshCut& cut, const Optica
   return light.intake_is_plan_area() ? light : light.sharing(intake_inside(mesh, cut, light));
 }
 
+namespace {
+
+/// LightPath::intake() of a mesh's triangles. A ray is solved for once a vertex, which six
+/// triangles share.
+class TriangleIntakes {
+ public:
+  TriangleIntakes(const SurfaceMesh& mesh, const LightPath& light) : mesh_(mesh), light_(light) {
+    if (!light.varies()) return;
+    rays_.reserve(static_cast<std::size_t>(mesh.vertex_count()));
+    for (const Eigen::Vector3d p : mesh.vertices.colwise()) rays_.push_back(light.ray_to(p));
+  }
+
+  [[nodiscard]] double at(std::int64_t triangle) const {
+    const VertexRays rays{rays_.empty() ? nullptr : rays_.data()};
+    return light_.intake(mesh_.corners(triangle), rays.at(mesh_.triangles.col(triangle).data()));
+  }
+
+ private:
+  const SurfaceMesh& mesh_;
+  const LightPath& light_;
+  std::vector<IncidentRay> rays_;  ///< By vertex; empty for parallel light.
+};
+
+}  // namespace
+
 double intake_inside(const SurfaceMesh& mesh, const MeshCut& cut, const LightPath& light) {
+  const TriangleIntakes intakes(mesh, light);
   double sum = 0.0;
   for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
     const double share = cut.share[static_cast<std::size_t>(t)];
-    if (share > 0.0) sum += share * light.intake(mesh.corners(t));
+    if (share > 0.0) sum += share * intakes.at(t);
   }
   return sum;
 }
 
 double intake_of(const SurfaceMesh& mesh, const LightPath& light) {
+  const TriangleIntakes intakes(mesh, light);
   double sum = 0.0;
-  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) sum += light.intake(mesh.corners(t));
+  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) sum += intakes.at(t);
   return sum;
 }
 

@@ -544,8 +544,9 @@ struct SourcePoint {
 
 /// Points distributed over a source, with shares that sum to 1. A disc has `count` points of equal
 /// shares along Vogel's spiral (1979), of which every other point is spread as evenly. A shape has
-/// the centres of its lit pixels, each subdivided so that there are about `count` in all, at least
-/// one per pixel. A source without extent is one point. @pre count ≥ 1.
+/// the centres of its lit pixels, each subdivided so that there are about `count` in all; if that
+/// is less than one for four pixels, the centres of light of blocks of pixels. A source without
+/// extent is one point. @pre count ≥ 1.
 std::vector<SourcePoint> source_points(const SourceExtent& extent, int count);
 
 /// The light of one point of the source alone: parallel light turned by `at`, or light from a point

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -57,12 +59,66 @@ GridShape shape_of(const SplinePart<Exec>& part) {
   return std::visit([](const auto& nodes) { return nodes.shape(); }, part);
 }
 
+/// Counts the triangles of a grid of points (grid_triangles()) that are folded, seen from +z.
+struct CountFolds {
+  const double* points;
+  int columns;    ///< Points in a row.
+  double lowest;  ///< Area of a triangle that is not folded.
+
+  LF_HD std::array<double, 1> operator()(std::int64_t cell) const {
+    const std::int64_t a = cell / (columns - 1) * columns + cell % (columns - 1);
+    const std::int64_t d = a + columns;
+    return {folded(a, a + 1, d + 1) + folded(a, d + 1, d)};
+  }
+
+ private:
+  [[nodiscard]] LF_HD double folded(std::int64_t a, std::int64_t b, std::int64_t c) const {
+    const Corners t{column3(points, a), column3(points, b), column3(points, c)};
+    return plan_area(t) > lowest ? 0.0 : 1.0;
+  }
+};
+
+/// Tells whether a spline is a surface that a file can hold: none of its nodes' triangles is
+/// folded.
+template <class Exec>
+class SplineFoldsOn {
+ public:
+  /// @param size  of the lens, mm.
+  SplineFoldsOn(const GridShape& net, const Eigen::Vector2d& size, const Exec& executor)
+      : executor_(executor),
+        nodes_(spline_nodes_on(net, kMeshSamples, executor)),
+        shape_(nodes_.shape()),
+        cells_(std::int64_t{shape_.columns - 1} * (shape_.rows - 1)),
+        lowest_(kLeastShare * 0.5 * size.prod() / static_cast<double>(cells_)),
+        positions_(3 * static_cast<std::size_t>(shape_.columns) * shape_.rows),
+        normals_(positions_.size()) {}
+
+  [[nodiscard]] bool any(const double* points) {
+    nodes_.look(points, positions_.data(), normals_.data());
+    const CountFolds count{positions_.data(), shape_.columns, lowest_};
+    return pending_sum<1>(executor_, "folds", cells_, count).get()[0] > 0.0;
+  }
+
+ private:
+  /// Of an even grid's triangles: far above the rounding of their areas.
+  static constexpr double kLeastShare = 1e-6;
+
+  Exec executor_;
+  SplineNodesOn<Exec> nodes_;
+  GridShape shape_;
+  std::int64_t cells_;
+  double lowest_;  ///< mm²
+  typename Exec::template Buffer<double> positions_;
+  typename Exec::template Buffer<double> normals_;
+};
+
 /// DesignObjective as a function of a spline's control points: every node of the spline sends one
 /// ray by the spline's own normal. Barriers and goal are those of the mesh of the nodes; there are
 /// no smoothness terms. Same interface as DesignObjectiveOn.
 ///
 /// With ObjectiveOptions::made_by the nodes are those of the made surface (MadeNodes, or
-/// ShiftedNodes for wide knot cells), and value and gradient are means over MadeBy::drawn().
+/// ShiftedNodes for wide knot cells), and value and gradient are means over MadeBy::drawn(). Their
+/// barriers do not see a fold that making smooths away, so the spline itself is checked for folds.
 template <class Exec>
 class SplineObjectiveOn {
  public:
@@ -77,6 +133,7 @@ class SplineObjectiveOn {
         gradient_(static_cast<std::size_t>(net.vertices.size())) {
     positions_ = Buffer(3 * static_cast<std::size_t>(node_count()));
     positions_bar_ = Buffer(positions_.size());
+    if (options.made_by) folds_.emplace(net.grid, setup.lens_size, executor);
     if (setup.outline) {
       for (const int coefficients : {net.grid.columns, net.grid.rows}) {
         bases_.push_back(
@@ -95,6 +152,7 @@ class SplineObjectiveOn {
   }
 
   ObjectiveEvaluation evaluate(const double* points, double* gradient) {
+    if (folds_ && folds_->any(points)) return {};
     ObjectiveEvaluation mean;
     const double share = 1.0 / static_cast<double>(parts_.size());
     const auto entries = static_cast<std::int64_t>(share_.size());
@@ -181,6 +239,7 @@ class SplineObjectiveOn {
   Eigen::Matrix3Xd movable_;
   std::vector<AxisBasis> bases_;  ///< Bases of nodes along u and v; empty without an outline.
   std::vector<Part> parts_;
+  std::optional<SplineFoldsOn<Exec>> folds_;  ///< Of the spline, where the parts are others.
   Buffer share_;      ///< 1 / number of parts where a coordinate may move, else 0.
   Buffer positions_;  ///< Nodes of the last part.
   Buffer positions_bar_;

@@ -40,12 +40,17 @@ class Strips {
                        cut_mesh(rows.mesh, *setup_.outline, Executor::serial()));
   }
   /// light_on() for all strips.
-  [[nodiscard]] LightPath light() const {
-    LightPath light(setup_);
+  [[nodiscard]] LightPath light(const Executor& executor) const {
+    const LightPath light(setup_);
     if (light.intake_is_plan_area()) return light;
-    double intake = 0.0;
-    for (int k = 0; k < count(); ++k) intake += intake_of(strip(k).mesh, light);
-    return light.sharing(intake);
+    std::vector<double> intakes(static_cast<std::size_t>(count()));
+    parallel_for(
+        executor, "intake", count(),
+        [&](std::int64_t k) {
+          intakes[static_cast<std::size_t>(k)] = intake_of(strip(static_cast<int>(k)).mesh, light);
+        },
+        1);
+    return light.sharing(std::accumulate(intakes.begin(), intakes.end(), 0.0));
   }
 
  private:
@@ -78,7 +83,7 @@ std::vector<double> render_spline(const ControlNet& net, const OpticalSetup& set
 std::vector<double> render_spline(const ControlNet& net, int samples, const OpticalSetup& setup,
                                   const Executor& executor) {
   const Strips strips(net, samples, setup);
-  const LightPath light = strips.light();
+  const LightPath light = strips.light(executor);
   FluxImage image(setup.pixels.x(), setup.pixels.y());
   image.begin(executor);
   const auto add_strip = [&](std::int64_t k, const FluxAccumulator& picture) {

@@ -148,6 +148,44 @@ TEST_F(Studio, RefusesWhatIsNoPictureAndKeepsNothingOfIt) {
   EXPECT_TRUE(fs::exists(at("studio") / name / "studio.json"));
 }
 
+TEST_F(Studio, ARemovedProjectIsMovedAsideAndCanComeBack) {
+  Browser browser(path("studio"));
+  const fs::path aside = at("studio") / ".removed";
+  const auto remove = [&](const std::string& name) {
+    return browser.post("/projects/" + name + "/remove")->status;
+  };
+  const std::string name = browser.project("rings.png");
+  EXPECT_EQ(remove(name), 200);
+  EXPECT_EQ(browser.get("/projects/" + name + "/state.json")->status, 404);
+  EXPECT_TRUE(json::parse(browser.get("/studio.json")->body)["projects"].empty());
+  EXPECT_TRUE(fs::exists(aside / name / "studio.json"));
+  // Another one of the same name goes beside it.
+  EXPECT_EQ(browser.project("rings.png"), name);
+  EXPECT_EQ(remove(name), 200);
+  EXPECT_EQ(remove(name), 404);
+  EXPECT_TRUE(fs::exists(aside / (name + "-2") / "studio.json"));
+  fs::rename(aside / name, at("studio") / name);
+  EXPECT_EQ(browser.get("/projects/" + name + "/state.json")->status, 200);
+  // Not while something of it runs.
+  browser.post("/projects/" + name + "/run", json{{"step", "design"}});
+  EXPECT_EQ(remove(name), 400);
+  EXPECT_TRUE(fs::exists(at("studio") / name / "studio.json"));
+  browser.post("/projects/" + name + "/pause");
+}
+
+TEST_F(Studio, PrintsItsAddressEvenIfItIsToBeQuiet) {
+  Process studio({"studio", path("studio"), "--port", "0", "--quiet"});
+  for (int i = 0; i < 100 && !fs::exists(at("studio") / ".key"); ++i)
+    studio.runs_for(milliseconds(100));
+  studio.runs_for(milliseconds(300));
+  studio.send(SIGINT);
+  const Outcome outcome = studio.wait(std::chrono::seconds(5));
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out, HasSubstr("http://127.0.0.1:"));
+  EXPECT_THAT(outcome.out, HasSubstr("/?key="));
+}
+
 TEST_F(Studio, ServesNothingOutsideOfItsProjects) {
   Browser browser(path("studio"));
   const std::string name = browser.project("rings.png");
@@ -240,6 +278,21 @@ TEST_F(Studio, LeadsFromPictureToASentProgram) {
   browser.post(place + "/key", json{{"key", "Q"}});
   now = browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; });
   EXPECT_EQ(now["cut"]["status"], "interrupted") << now["cut"];
+  EXPECT_FALSE(now["cut"]["unfinished"]);  // A simulation begins anew.
+  // A machine does not: the page is told that there is a choice.
+  const auto send = [&](const std::string& how) {
+    browser.post(place + "/send",
+                 json{{"program", "finish.ngc"}, {"port", path("no-machine")}, {"how", how}});
+    return browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; })["cut"];
+  };
+  json cut = send("");
+  EXPECT_EQ(cut["status"], "failed") << cut;
+  EXPECT_TRUE(cut["unfinished"]) << cut;
+  EXPECT_THAT(cut["message"].get<std::string>(), HasSubstr("unfinished job"));
+  cut = send("resume");
+  EXPECT_THAT(cut["command"].get<std::string>(), HasSubstr("--resume"));
+  EXPECT_THAT(cut["message"].get<std::string>(), HasSubstr("no-machine"));
+  EXPECT_TRUE(cut["unfinished"]) << cut;
   browser.post(place + "/send", json{{"program", "finish.ngc"}, {"port", "sim:grbl@1000x"}});
   now = browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; });
   EXPECT_EQ(now["cut"]["status"], "done") << now["cut"];

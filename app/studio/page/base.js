@@ -67,6 +67,17 @@ function showError(step, message) {
   setHidden(line, !message);
 }
 
+// Asks in a dialog; true if it is answered with `yes`, the words of its button.
+function confirmed({ title, words, more, yes }) {
+  const dialog = find("confirm");
+  for (const [name, text] of Object.entries({ title, words, more, yes })) setText(find(`confirm-${name}`), text);
+  return new Promise((resolve) => {
+    dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes"), { once: true });
+    dialog.returnValue = "no";
+    dialog.showModal();
+  });
+}
+
 // ---- Numbers as text ----
 const number = (value, digits = 4) => String(Number(Number(value).toPrecision(digits))).replace("-", "−");
 const millimetres = (value) => `${number(value)} mm`;

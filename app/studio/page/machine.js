@@ -20,25 +20,24 @@ const machine = { trail: [], program: null, status: null };
 // ---- Sending ----
 const isSimulated = (port) => port.startsWith("sim:");
 
-function confirmed(program, port) {
-  const dialog = find("confirm");
-  setText(find("confirm-words"), `${program} goes to ${port}.`);
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes"), { once: true });
-    dialog.returnValue = "no";
-    dialog.showModal();
-  });
-}
+// What the operator is asked, by how a program is sent: from its start, or after a job that has not ended.
+const kHow = {
+  "": { title: "Send to a real machine?", yes: "Send",
+    more: "Is the blank clamped, the tool of this program in the spindle, and the work zero set? The spindle starts and the axes move." },
+  resume: { title: "Go on where it stopped?", yes: "Go on",
+    more: "Is the blank clamped as it was, and the same tool in the spindle? The machine homes, the spindle starts, and the tool goes back into the cut." },
+  restart: { title: "Begin again?", yes: "Begin again",
+    more: "The journal of the first try is lost. Is the blank clamped, the tool of this program in the spindle, and the work zero set? The spindle starts and the axes move." },
+};
 
-async function sendProgram(e) {
-  e.preventDefault();
-  const program = find("program").value, port = find("port").value.trim();
+async function sendProgram(how) {
+  const { program, port } = how ? page.state.cut : { program: find("program").value, port: find("port").value.trim() };
   if (!program) return showError(5, "There is no program yet: cut the part first.");
   if (!port) return showError(5, "Name the port of the controller.");
-  if (!isSimulated(port) && !await confirmed(program, port)) return;
+  if (!isSimulated(port) && !await confirmed({ ...kHow[how], words: `${program} goes to ${port}.` })) return;
   machine.trail = [];
   // The keys work at once.
-  if (await act(5, "send", { program, port })) find("keys").querySelector("button").focus();
+  if (await act(5, "send", { program, port, how })) find("keys").querySelector("button").focus();
 }
 
 // ---- Keys ----
@@ -68,7 +67,11 @@ function makeMachine() {
       "aria-keyshortcuts": kKeyNames[key] || key, onclick: () => pressKey(key) }, make("kbd", { text: shown, "aria-hidden": "true" }), does));
     find("keys").append(make("div", { role: "group", "aria-label": words }, ...buttons));
   }
-  find("send").addEventListener("submit", sendProgram);
+  find("send").addEventListener("submit", (e) => {
+    e.preventDefault();
+    sendProgram("");
+  });
+  for (const how of ["resume", "restart"]) find(how).addEventListener("click", () => sendProgram(how));
   find("machine").addEventListener("keydown", keyDown);
   // Firefox presses a button when the space bar goes up.
   find("machine").addEventListener("keyup", (e) => { if (e.key === " " && cutRuns() && e.target.matches("button")) e.preventDefault(); });
@@ -121,9 +124,11 @@ function showCut(cut) {
   find("cut-bar").firstElementChild.style.width = `${share}%`;
   setText(find("cut-progress"), `${share.toFixed(1)} % of ${cut.program} on ${cut.port}` + (runs && cut.left ? `, ${minutesText(cut.left / 60)} left` : ""));
   setText(find("tool-words"), cut.tool ? "The dot is the tool, over the lens as the cutter sees it." : "The lens as the cutter sees it.");
+  setHidden(find("unfinished"), !cut.unfinished);
   showNumbers(cutNumbers(cut));
   for (const button of find("keys").querySelectorAll("button")) setAttribute(button, "aria-disabled", !runs);
-  rebuild(find("cut-messages"), cut.messages || [], (lines) => lines.map((text) => make("li", { text })));
+  const said = (cut.messages || []).concat(cut.status === "failed" && cut.message ? [cut.message] : []);
+  rebuild(find("cut-messages"), said, (lines) => lines.map((text) => make("li", { text })));
   const heard = `${cut.status} ${cut.state}`;
   if (machine.status !== heard && machine.status) say(`${cut.program} ${kCutWords[cut.status]}${runs && cut.state ? `: ${cut.state}` : ""}.`);
   machine.status = heard;

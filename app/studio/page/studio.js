@@ -231,12 +231,26 @@ async function openProject(name) {
   ++epoch;
   heardJob = null;
   machine.status = null;
-  for (let step = 0; step <= 5; ++step) showError(step, "");
+  for (const step of [0, 1, 2, 3, 4, 5, "project"]) showError(step, "");
   if (decodeURIComponent(location.hash.slice(1)) !== name) history.pushState(null, "", `#${encodeURIComponent(name)}`);
   setHidden(find("start"), true);
   setHidden(find("project"), false);
   listed = 0;
   await tick();
+}
+
+async function removeProject() {
+  const name = page.project;
+  const sure = await confirmed({ title: `Remove ${name}?`, words: `Its folder moves to ${page.folder}/.removed.`, yes: "Remove",
+    more: "Nothing is deleted: move the folder back and it is a project again, or delete it to free the disk." });
+  if (!sure) return;
+  try {
+    await post(`/projects/${encodeURIComponent(name)}/remove`);
+  } catch (e) {
+    return showError("project", e instanceof Refusal ? e.message : "The studio did not answer; nothing was changed.");
+  }
+  say(`${name} is removed.`);
+  if (page.project === name) startProject(true);
 }
 
 const hashName = () => {
@@ -262,6 +276,7 @@ function listenToButtons() {
     });
   }
   find("view").addEventListener("click", openView);
+  find("remove").addEventListener("click", removeProject);
   find("undo").addEventListener("click", () => act(3, "undo"));
   find("redo").addEventListener("click", () => act(3, "redo"));
   window.addEventListener("hashchange", followHash);

@@ -255,6 +255,21 @@ for (let i = 0; i < 400; ++i) {
 }
 for (const id of ["data-new", "crop-width", "tone-gamma", "data-original", "f-lamp", "data-scene", "data-run=plan", "data-run=design", "data-view", "data-run=cam", "format", "data-run=export", "program", "port"]) check(`Tab reaches ${id}`, reached.has(id));
 check("every stop of Tab has a visible focus", hiddenFocus === 0, `${hiddenFocus} have none`);
+
+// ---- Removing ----
+await press("[data-remove]");
+await shown("[data-confirm][open]");
+check("the dialog names the project and where it goes", (await text("[data-confirm]")).includes(project) && (await text("[data-confirm]")).includes("/.removed"), await text("[data-confirm]"));
+await look("remove");
+await tab.keyboard.press("Enter");
+await until(() => !document.querySelector("[data-confirm]").open);
+check("not yet keeps it", (await text("[data-name]")) === project);
+await press("[data-remove]");
+await shown("[data-confirm][open]");
+await press("[data-confirm-yes]");
+await shown("[data-start]");
+await until((name) => ![...document.querySelectorAll("[data-projects] b")].some((b) => b.textContent === name), project);
+check("a removed project leaves the list", true);
 check("the browser has no complaints", complaints.length === 0, complaints.join("\n      "));
 await browser.close();
 console.log(failed ? `${failed} checks failed` : "all checks passed");

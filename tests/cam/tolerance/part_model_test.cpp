@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -219,6 +220,12 @@ OpticalSetup point_setup() {
   return optics;
 }
 
+OpticalSetup disc_setup() {
+  OpticalSetup optics = point_setup();
+  optics.extent.width = 0.6;
+  return optics;
+}
+
 OpticalSetup tilted_setup() {
   OpticalSetup optics = setup();
   optics.screen_x = {std::cos(0.3), 0.0, std::sin(0.3)};
@@ -229,9 +236,12 @@ OpticalSetup tilted_setup() {
 /// is made for this light, are the chain's.
 TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
   const SurfaceMesh mesh = testing::grid_mesh(51, 51, kSide, kSide, relief);
-  for (const OpticalSetup& optics : {mirror_setup(), point_setup(), tilted_setup()}) {
-    SCOPED_TRACE(lamp_place(optics.lamp) ? "point"
-                                         : (optics.screen_is_turned() ? "tilted" : "mirror"));
+  const std::array<std::pair<const char*, OpticalSetup>, 4> lights{{{"mirror", mirror_setup()},
+                                                                    {"point", point_setup()},
+                                                                    {"disc", disc_setup()},
+                                                                    {"tilted", tilted_setup()}}};
+  for (const auto& [name, optics] : lights) {
+    SCOPED_TRACE(name);
     const auto render = [&](const SurfaceField& field, const OpticalSetup& by) {
       FieldRenderSetup rendering = fine(by);
       rendering.whole = {intake_of(mesh, LightPath(by))};
@@ -256,7 +266,9 @@ TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
       const PictureQuality by_model = judge.judge(model.render(error, executor()));
       EXPECT_GT(chain.leakage, 0.003);
       EXPECT_NEAR(by_model.metrics.mae, chain.metrics.mae, std::max(5e-4, 0.1 * chain.metrics.mae));
-      EXPECT_NEAR(by_model.leakage, chain.leakage, 0.1 * chain.leakage);
+      // A convolution misplaces 0.2 % of an extended source's light.
+      EXPECT_NEAR(by_model.leakage, chain.leakage,
+                  optics.extent.none() ? 0.1 * chain.leakage : 0.0025);
     }
   }
 }

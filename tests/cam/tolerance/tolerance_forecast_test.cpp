@@ -63,7 +63,7 @@ class Toy {
   [[nodiscard]] ToleranceForecast forecast(std::int64_t parts,
                                            const Executor& executor = Executor::cpu(2),
                                            const RunControl& control = {}) const {
-    return forecast_parts(*model_, source_, *judge_, parts, executor, control);
+    return forecast_parts(*model_, source_, *judge_, ranking_draws(parts), executor, control);
   }
   ErrorSource& source() { return source_; }
 

@@ -8,6 +8,7 @@
 
 #include "cam/cam.h"
 #include "cam/cam_meshes.h"
+#include "cam/predict/prediction.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 
@@ -50,10 +51,33 @@ TEST(ToleranceJob, ReportsWhatToExpect) {
   EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr("How sure is the forecast"));
 }
 
-TEST(ToleranceJob, ByDefaultNothingIsDrawn) {
+TEST(ToleranceJob, ByDefaultAFewAreDrawnForTheRange) {
   const TempFolder folder;
-  EXPECT_TRUE(run(drawn(0), folder).report.tolerances.empty());
+  const ToleranceForecast forecast = run(drawn(0), folder).report.tolerances;
+  EXPECT_GE(forecast.parts, 10);
+  EXPECT_TRUE(forecast.causes.empty());
+  const auto report = nlohmann::json::parse(read_bytes(folder / "report.json"));
+  EXPECT_EQ(report["tolerances"]["mae"]["p90"], forecast.mae.p90);
+  EXPECT_TRUE(report["tolerances"]["causes"].empty());
+  EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr(" --tolerances 50"));
+}
+
+TEST(ToleranceJob, WithoutRangeNothingIsDrawn) {
+  const TempFolder folder;
+  CamOptions options = drawn(0);
+  options.range = false;
+  EXPECT_TRUE(run(options, folder).report.tolerances.empty());
   EXPECT_FALSE(nlohmann::json::parse(read_bytes(folder / "report.json")).contains("tolerances"));
+  EXPECT_THAT(read_bytes(folder / "report.html"), HasSubstr(" --tolerances 50"));
+}
+
+TEST(ToleranceJob, WhatHasNoRangeIsCutWithoutOne) {
+  CamOptions two = drawn(0);
+  two.workshop.process.finish.large_tool = 2;
+  EXPECT_EQ(part_draws(two, small_lens().setup).parts, 0);
+  CamOptions programs = drawn(0);
+  programs.render = false;
+  EXPECT_EQ(part_draws(programs, small_lens().setup).parts, 0);
 }
 
 TEST(ToleranceJob, AMouldsPartsAreThoseThatAreCastInIt) {

@@ -53,6 +53,29 @@ TEST(SourcePoints, AShapeHasItsBrightPixelWhereItIsSeen) {
   EXPECT_NEAR(m.mean.y(), 0.75 * 1.5 - 0.25 * 1.5, 1e-12);
 }
 
+TEST(SourcePoints, AFewPointsOfAShapeHaveItsLightAndCentre) {
+  // A ring around another place than the middle.
+  SourceShape shape{16, 12, {}};
+  for (int r = 0; r < shape.rows; ++r) {
+    for (int c = 0; c < shape.columns; ++c) {
+      const double radius = std::hypot(c - 9.0, r - 5.0);
+      shape.weights.push_back(radius > 2.5 && radius < 5.5 ? 1.0 + 0.1 * c : 0.0);
+    }
+  }
+  const SourceExtent extent{8.0, shape};
+  const std::vector<SourcePoint> all = source_points(extent, 1000);
+  const std::vector<SourcePoint> few = source_points(extent, 9);
+  EXPECT_GT(all.size(), 60U);
+  EXPECT_LE(few.size(), 16U);
+  const Moments exact = moments_of(all);
+  const Moments m = moments_of(few);
+  EXPECT_NEAR(m.whole, 1.0, 1e-12);
+  EXPECT_LT((m.mean - exact.mean).norm(), 1e-12);
+  // Each block misses at most its own spread, about 4 pixels' side squared over 12.
+  const double side = 4.0 * 8.0 / 16.0;
+  EXPECT_LT((m.spread - exact.spread).cwiseAbs().maxCoeff(), side * side / 12.0);
+}
+
 TEST(SourcePoints, ThroughAThinLensTheImageIsTurnedAndScaledByTheDistances) {
   OpticalSetup setup;
   setup.extent.width = 1e-3;

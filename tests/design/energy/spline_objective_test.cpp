@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -116,6 +117,33 @@ TEST_F(SplineObjective, PictureOfTheMadePartIsThatOfItsSurface) {
     EXPECT_NEAR(made.mae, mean_absolute_error(nodes), 1e-6);
     EXPECT_GT(std::fabs(made.mae - mean_absolute_error(spline_nodes(net_, kSamples))), 1e-4);
   }
+}
+
+bool is_folded(const SurfaceMesh& mesh) {
+  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
+    if (mesh.plan_area(t) <= 0.0) return true;
+  }
+  return false;
+}
+
+/// Making averages a narrow fold away, but no file can hold the spline.
+TEST_F(SplineObjective, AFoldThatMakingSmoothsAwayIsNotAllowed) {
+  options_.made_by = kMade;
+  options_.area = {1e-9 * mean_, 1e-6 * mean_};
+  Eigen::Matrix3Xd gradient(3, net_.points.cols());
+  const auto feasible = [&] {
+    SplineObjectiveOn<Executor> function = objective();
+    function.relinearize(net_.points.data());
+    return function.evaluate(net_.points.data(), gradient.data()).feasible;
+  };
+  ASSERT_TRUE(feasible());
+  const Eigen::Index pushed = 5 * net_.shape.columns + 5;
+  while (!is_folded(spline_nodes(net_, kMeshSamples).mesh)) {
+    net_.points(0, pushed) += 0.05;
+    net_.points(0, pushed + 1) -= 0.05;
+  }
+  EXPECT_FALSE(is_folded(made_nodes(net_, kMade, kSamples, Executor::serial()).mesh));
+  EXPECT_FALSE(feasible());
 }
 
 TEST_F(SplineObjective, GradientOfTheMadePartEqualsCentralDifferences) {
