@@ -266,9 +266,9 @@ TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
       const PictureQuality by_model = judge.judge(model.render(error, executor()));
       EXPECT_GT(chain.leakage, 0.003);
       EXPECT_NEAR(by_model.metrics.mae, chain.metrics.mae, std::max(5e-4, 0.1 * chain.metrics.mae));
-      // A convolution misplaces 0.2 % of an extended source's light.
+      // A convolution misplaces 0.3 % of an extended source's light.
       EXPECT_NEAR(by_model.leakage, chain.leakage,
-                  optics.extent.none() ? 0.1 * chain.leakage : 0.0025);
+                  optics.extent.none() ? 0.1 * chain.leakage : 0.0035);
     }
   }
 }
