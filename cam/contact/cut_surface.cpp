@@ -186,7 +186,7 @@ class TriangleParts {
   [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector2i& place) const {
     const Eigen::Vector3d w = weights(place);
     const Eigen::Vector2d xy = corner_ * w;
-    return {xy.x(), xy.y(), surface_.in_triangle(triangle_, w).z};
+    return {xy.x(), xy.y(), surface_.height_in(triangle_, w)};
   }
 
  private:

@@ -154,6 +154,12 @@ class Continuation {
     steepest_ = std::min(kSteepest, kMostOfMean * steep / length);
     // What a curvature adds to the slope in the end is bounded like the slope.
     most_bent_ = std::min(steepest_ / run_out_.slope(run_out_.length), kMostOfMean * bent / length);
+    for (int side = 0; side < kSides; ++side) {
+      CornerPoints& corner = corners_[static_cast<std::size_t>(side)];
+      for (std::size_t k = 0; k < corner.size(); ++k) {
+        corner[k] = rim_.point(side, rim_.end(side) - kStep * static_cast<double>(k));
+      }
+    }
   }
 
   [[nodiscard]] const Rim& rim() const { return rim_; }
@@ -170,34 +176,29 @@ class Continuation {
     return {here.z, here.out * axes.out + (here.along + along) * axes.along};
   }
 
+  /// beyond().z
+  [[nodiscard]] double height_beyond(int side, const Eigen::Vector2d& xy) const {
+    const Side axes = side_of(side);
+    return strip(side, axes.along.dot(xy), axes.out.dot(xy)).z;
+  }
+
   /// Beyond a side and the next one: the strip of the first, continued like the surface.
   [[nodiscard]] SurfacePoint beyond_corner(int side, const Eigen::Vector2d& xy) const {
     const Side axes = side_of(side);
-    const double corner = rim_.end(side);
-    std::array<Strip, 4> strips;
-    for (std::size_t k = 0; k < strips.size(); ++k) {
-      strips[k] = strip(side, corner - kStep * static_cast<double>(k), axes.out.dot(xy));
-    }
-    const double distance = std::max(axes.along.dot(xy) - corner, 0.0);
-    // Derivatives from four places, exact for cubics.
-    const auto first = [](double a, double b, double c, double d) {
-      return (11.0 * a - 18.0 * b + 9.0 * c - 2.0 * d) / (6.0 * kStep);
-    };
-    const auto second = [](double a, double b, double c, double d) {
-      return (2.0 * a - 5.0 * b + 4.0 * c - d) / (kStep * kStep);
-    };
-    const auto& [a, b, c, d] = strips;
-    const double slope = std::clamp(first(a.z, b.z, c.z, d.z), -steepest_, steepest_);
-    const double bend =
-        a.curved ? std::clamp(second(a.z, b.z, c.z, d.z), -most_bent_, most_bent_) : 0.0;
-    const bool rising = std::abs(slope) < steepest_;
+    const Corner corner = corner_of(side, xy);
+    const auto& [a, b, c, d] = corner.strips;
+    const bool rising = std::abs(corner.slope) < steepest_;
     const double out_slope = rising ? first(a.out, b.out, c.out, d.out) : 0.0;
-    const bool bent = std::abs(bend) < most_bent_;
+    const bool bent = std::abs(corner.bend) < most_bent_;
     const double out_bend = a.curved && bent ? second(a.out, b.out, c.out, d.out) : 0.0;
-    const double height = run_out_.height(distance);
-    return {a.z + distance * slope + height * bend,
-            (slope + run_out_.slope(distance) * bend) * axes.along +
-                (a.out + distance * out_slope + height * out_bend) * axes.out};
+    const double distance = corner.distance;
+    return {corner.z,
+            (corner.slope + run_out_.slope(distance) * corner.bend) * axes.along +
+                (a.out + distance * out_slope + run_out_.height(distance) * out_bend) * axes.out};
+  }
+  /// beyond_corner().z
+  [[nodiscard]] double height_beyond_corner(int side, const Eigen::Vector2d& xy) const {
+    return corner_of(side, xy).z;
   }
 
  private:
@@ -210,15 +211,52 @@ class Continuation {
     double along = 0.0;   ///< Slope of the rim along it.
     bool curved = false;  ///< The rim's curvature is continued.
   };
+  /// Points of a side's rim from its end backwards, kStep apart.
+  using CornerPoints = std::array<RimPoint, 4>;
+  /// A place beyond a side and the next one.
+  struct Corner {
+    std::array<Strip, 4> strips;  ///< Beyond the CornerPoints.
+    double distance = 0.0;        ///< From the next side, mm.
+    double slope = 0.0;           ///< Of the strip along the side, at its end.
+    double bend = 0.0;            ///< Curvature there, 1/mm.
+    double z = 0.0;               ///< mm
+  };
+
+  // Derivatives at the first of four places kStep apart, exact for cubics.
+  static double first(double a, double b, double c, double d) {
+    return (11.0 * a - 18.0 * b + 9.0 * c - 2.0 * d) / (6.0 * kStep);
+  }
+  static double second(double a, double b, double c, double d) {
+    return (2.0 * a - 5.0 * b + 4.0 * c - d) / (kStep * kStep);
+  }
 
   static double bend_at(int side, const RimPoint& rim) {
     const Eigen::Vector2d out = side_of(side).out;
     return out.dot(rim.shape.bend * out);
   }
 
-  [[nodiscard]] Strip strip(int side, double at, double level) const {
+  [[nodiscard]] Corner corner_of(int side, const Eigen::Vector2d& xy) const {
     const Side axes = side_of(side);
-    const RimPoint rim = rim_.point(side, at);
+    const CornerPoints& rim = corners_[static_cast<std::size_t>(side)];
+    Corner corner;
+    for (std::size_t k = 0; k < rim.size(); ++k) {
+      corner.strips[k] = strip(side, rim[k], axes.out.dot(xy));
+    }
+    const auto& [a, b, c, d] = corner.strips;
+    corner.distance = std::max(axes.along.dot(xy) - rim_.end(side), 0.0);
+    corner.slope = std::clamp(first(a.z, b.z, c.z, d.z), -steepest_, steepest_);
+    corner.bend = a.curved ? std::clamp(second(a.z, b.z, c.z, d.z), -most_bent_, most_bent_) : 0.0;
+    corner.z =
+        a.z + corner.distance * corner.slope + run_out_.height(corner.distance) * corner.bend;
+    return corner;
+  }
+
+  [[nodiscard]] Strip strip(int side, double at, double level) const {
+    return strip(side, rim_.point(side, at), level);
+  }
+
+  [[nodiscard]] Strip strip(int side, const RimPoint& rim, double level) const {
+    const Side axes = side_of(side);
     const double distance = std::max(level - axes.out.dot(rim.place), 0.0);
     const double slope = std::clamp(rim.shape.slope.dot(axes.out), -steepest_, steepest_);
     const double bend = std::clamp(bend_at(side, rim), -most_bent_, most_bent_);
@@ -236,6 +274,7 @@ class Continuation {
   RunOut run_out_;
   double steepest_ = kSteepest;  ///< Rise over run.
   double most_bent_ = 0.0;       ///< 1/mm
+  std::array<CornerPoints, kSides> corners_;
 };
 
 /// A triangle of the continuation: beyond this side, or beyond it and the next one.
@@ -397,10 +436,22 @@ class ContinuedSurface final : public OpticalSurface {
       return place.corner ? continuation.beyond_corner(place.side, xy)
                           : continuation.beyond(place.side, xy);
     }
+
+    /// point().z
+    [[nodiscard]] double height(std::size_t triangle, const Eigen::Vector2d& xy) const {
+      const Beyond& place = beyond[triangle];
+      return place.corner ? continuation.height_beyond_corner(place.side, xy)
+                          : continuation.height_beyond(place.side, xy);
+    }
   };
 
   explicit ContinuedSurface(Parts parts) : OpticalSurface(parts.mesh), parts_(std::move(parts)) {
     parts_.mesh = {};
+    middles_.reserve(parts_.beyond.size());
+    for (std::size_t n = 0; n < parts_.beyond.size(); ++n) {
+      const auto [a, b, c] = places_of(first() + static_cast<std::int64_t>(n));
+      middles_.push_back(parts_.height(n, (a + b + c) / 3.0));
+    }
   }
 
   [[nodiscard]] bool has_creases() const override { return false; }
@@ -408,21 +459,20 @@ class ContinuedSurface final : public OpticalSurface {
   [[nodiscard]] SurfacePoint in_triangle(std::int64_t triangle,
                                          const Eigen::Vector3d& weights) const override {
     if (triangle < first()) return parts_.inner->in_triangle(triangle, weights);
-    Eigen::Vector2d xy(0.0, 0.0);
-    for (int k = 0; k < 3; ++k) xy += weights[k] * mesh().corner(triangle, k).head<2>();
-    return parts_.point(number(triangle), xy);
+    return parts_.point(number(triangle), place_in(triangle, weights));
+  }
+
+  [[nodiscard]] double height_in(std::int64_t triangle,
+                                 const Eigen::Vector3d& weights) const override {
+    if (triangle < first()) return parts_.inner->height_in(triangle, weights);
+    return parts_.height(number(triangle), place_in(triangle, weights));
   }
 
   [[nodiscard]] SmoothPatch patch_in(std::int64_t triangle,
                                      const Eigen::Vector3d& weights) const override {
     if (triangle < first()) return parts_.inner->patch_in(triangle, weights);
-    std::array<Eigen::Vector2d, 3> places;
-    for (int k = 0; k < 3; ++k) {
-      places[static_cast<std::size_t>(k)] = mesh().corner(triangle, k).head<2>();
-    }
-    const Eigen::Vector2d middle = (places[0] + places[1] + places[2]) / 3.0;
-    return cubic_through(places, parts_.corners[number(triangle)],
-                         parts_.point(number(triangle), middle).z);
+    const std::size_t n = number(triangle);
+    return cubic_through(places_of(triangle), parts_.corners[n], middles_[n]);
   }
 
   [[nodiscard]] BendRange bend_range(std::int64_t triangle) const override {
@@ -441,8 +491,23 @@ class ContinuedSurface final : public OpticalSurface {
   [[nodiscard]] std::size_t number(std::int64_t triangle) const {
     return static_cast<std::size_t>(triangle - first());
   }
+  /// Of a triangle's corners, seen from above.
+  [[nodiscard]] std::array<Eigen::Vector2d, 3> places_of(std::int64_t triangle) const {
+    std::array<Eigen::Vector2d, 3> places;
+    for (int k = 0; k < 3; ++k) {
+      places[static_cast<std::size_t>(k)] = mesh().corner(triangle, k).head<2>();
+    }
+    return places;
+  }
+  [[nodiscard]] Eigen::Vector2d place_in(std::int64_t triangle,
+                                         const Eigen::Vector3d& weights) const {
+    Eigen::Vector2d xy(0.0, 0.0);
+    for (int k = 0; k < 3; ++k) xy += weights[k] * mesh().corner(triangle, k).head<2>();
+    return xy;
+  }
 
   Parts parts_;
+  std::vector<double> middles_;  ///< Heights in the middles of the triangles beyond, mm.
 };
 
 /// The smooth surface with its own slopes at all vertices, old and new: slopes stay continuous

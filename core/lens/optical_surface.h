@@ -169,6 +169,11 @@ class OpticalSurface {
     const SurfacePoint point = in_triangle(triangle, weights);
     return {point.z, point.slope, Eigen::Matrix2d::Zero()};
   }
+  /// in_triangle().z alone, mm, with the same bits.
+  [[nodiscard]] virtual double height_in(std::int64_t triangle,
+                                         const Eigen::Vector3d& weights) const {
+    return in_triangle(triangle, weights).z;
+  }
 
   /// The point above xy; nothing outside the mesh.
   [[nodiscard]] std::optional<SurfacePoint> at(const Eigen::Vector2d& xy) const;

@@ -88,20 +88,53 @@ SplineFrame ControlNet::at(const Eigen::Vector2d& uv) const {
 
 namespace {
 
+/// A place of the spline seen from above and its derivatives by the parameters.
+struct PlanFrame {
+  Eigen::Vector2d point = Eigen::Vector2d::Zero();
+  Eigen::Vector2d by_u = Eigen::Vector2d::Zero();
+  Eigen::Vector2d by_v = Eigen::Vector2d::Zero();
+};
+
+/// What a search needs of frame_of(), with the same bits.
+PlanFrame plan_of(const ControlNet& net, const CubicBasis& u, const CubicBasis& v) {
+  PlanFrame frame;
+  for (std::size_t j = 0; j < 4; ++j) {
+    Eigen::Vector2d point = Eigen::Vector2d::Zero();
+    Eigen::Vector2d by_u = Eigen::Vector2d::Zero();
+    const Eigen::Index first =
+        Eigen::Index{v.first + static_cast<int>(j)} * net.shape.columns + u.first;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto c = net.points.col(first + static_cast<Eigen::Index>(i)).head<2>();
+      point += u.value[i] * c;
+      by_u += u.slope[i] * c;
+    }
+    frame.point += v.value[j] * point;
+    frame.by_u += v.value[j] * by_u;
+    frame.by_v += v.slope[j] * point;
+  }
+  return frame;
+}
+
 /// Newton's method. @return distance that was left before its last step.
 double search(const ControlNet& net, const Eigen::Vector2d& xy, Eigen::Vector2d& uv) {
-  const Eigen::Vector2d high = net.cells().cast<double>();
+  const Eigen::Vector2i cells = net.cells();
+  const Eigen::Vector2d high = cells.cast<double>();
+  CubicBasis u = cubic_basis(uv.x(), cells.x());
+  CubicBasis v = cubic_basis(uv.y(), cells.y());
   double left = 0.0;
   for (int step = 0; step < kMaxSteps; ++step) {
-    const SplineFrame frame = net.at(uv);
+    const PlanFrame frame = plan_of(net, u, v);
     Eigen::Matrix2d plan;
-    plan << frame.by_u.head<2>(), frame.by_v.head<2>();
+    plan << frame.by_u, frame.by_v;
     const Eigen::Vector2d before = uv;
-    const Eigen::Vector2d way = xy - frame.point.head<2>();
+    const Eigen::Vector2d way = xy - frame.point;
     left = way.norm();
     uv += plan.inverse() * way;
     uv = uv.cwiseMax(0.0).cwiseMin(high);
     if ((uv - before).cwiseAbs().maxCoeff() < kShortStep * high.maxCoeff()) break;
+    // On a rim one of them stays.
+    if (uv.x() != before.x()) u = cubic_basis(uv.x(), cells.x());
+    if (uv.y() != before.y()) v = cubic_basis(uv.y(), cells.y());
   }
   return left;
 }
