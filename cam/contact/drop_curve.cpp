@@ -498,12 +498,13 @@ std::vector<CurvePiece> drop_curve(const DropCutter& cutter, const AxisLine& lin
   // requested.
   const double length = kStretchPerRadius * cutter.radius();
   double begin = from;
+  CutterLocation at = cutter.drop(line.at(begin));
   for (auto i = static_cast<std::int64_t>(std::floor(from / length)); begin < to; ++i) {
     double end = static_cast<double>(i + 1) * length;
     if (to - end < kShortestStretch) end = to;
     if (end - begin < kShortestStretch && end < to) continue;
     const Stretch stretch{line, cutter.radius(), begin, end};
-    cutter.find_contenders(line.at(begin), line.at(end), contenders);
+    at = cutter.find_contenders(line.at(begin), at, line.at(end), contenders);
     offers.clear();
     for (const Contender& one : contenders) offer_facet(one, stretch, offers);
     for (const Contender& one : contenders) offer_boundary(one, stretch, offers);

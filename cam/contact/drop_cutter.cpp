@@ -263,9 +263,8 @@ void DropCutter::visit_cells(const Level& level, const Eigen::AlignedBox2d& axis
 
 /// A lower bound of the tip between two places: the triangle that holds it at one of them would
 /// still hold it at the other, and the height on one triangle is concave.
-double DropCutter::floor_between(const Eigen::Vector2d& from, const Eigen::Vector2d& to) const {
-  const CutterLocation at_from = drop(from);
-  const CutterLocation at_to = drop(to, at_from);
+double DropCutter::floor_between(const Eigen::Vector2d& from, const CutterLocation& at_from,
+                                 const Eigen::Vector2d& to, const CutterLocation& at_to) const {
   if (!at_from.rests() || !at_to.rests()) return kNoContact;
   const auto held = [&](const CutterLocation& location, const Eigen::Vector2d& other) {
     const std::size_t item = index_of(item_of_[index_of(location.triangle)]);
@@ -274,14 +273,17 @@ double DropCutter::floor_between(const Eigen::Vector2d& from, const Eigen::Vecto
   return std::max(held(at_from, to), held(at_to, from));
 }
 
-void DropCutter::find_contenders(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
-                                 std::vector<Contender>& contenders) const {
+CutterLocation DropCutter::find_contenders(const Eigen::Vector2d& from,
+                                           const CutterLocation& at_from, const Eigen::Vector2d& to,
+                                           std::vector<Contender>& contenders) const {
   contenders.clear();
-  if (levels_.empty()) return;
+  if (levels_.empty()) return {};
+  const CutterLocation at_to = drop(to, at_from);
   const Eigen::Vector3d& origin = bounds_.min();
   Eigen::AlignedBox2d axis(Eigen::Vector2d(from - origin.head<2>()));
   axis.extend(Eigen::Vector2d(to - origin.head<2>()));
-  const double centre = floor_between(from, to) - kReachMargin - origin.z() + radius_;
+  const double centre =
+      floor_between(from, at_from, to, at_to) - kReachMargin - origin.z() + radius_;
   const auto out_of = [&](const Reach& reach) {
     const double dx = std::max({reach.x_min - axis.max().x(), axis.min().x() - reach.x_max, 0.0});
     const double dy = std::max({reach.y_min - axis.max().y(), axis.min().y() - reach.y_max, 0.0});
@@ -300,6 +302,7 @@ void DropCutter::find_contenders(const Eigen::Vector2d& from, const Eigen::Vecto
   }
   std::sort(contenders.begin(), contenders.end(),
             [](const Contender& a, const Contender& b) { return a.triangle < b.triangle; });
+  return at_to;
 }
 
 void DropCutter::search_level(const Level& level, Search& search) const {

@@ -73,8 +73,10 @@ class DropCutter {
   /// Finds every triangle that holds the ball up somewhere between `from` and `to` (mm), in order
   /// of number, and possibly others. Short stretches have few. Replaces the contents of
   /// `contenders`.
-  void find_contenders(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
-                       std::vector<Contender>& contenders) const;
+  /// @param at_from  drop(from). @return drop(to), for the next stretch.
+  CutterLocation find_contenders(const Eigen::Vector2d& from, const CutterLocation& at_from,
+                                 const Eigen::Vector2d& to,
+                                 std::vector<Contender>& contenders) const;
 
   [[nodiscard]] double radius() const { return radius_; }
   /// Corners of a triangle of the mesh, in some order, as columns.
@@ -108,7 +110,8 @@ class DropCutter {
   void sort_into_cells(const SurfaceMesh& mesh, const std::vector<double>& extents);
   void fill_items(const SurfaceMesh& mesh, const Executor& executor);
   void bound_cells();
-  [[nodiscard]] double floor_between(const Eigen::Vector2d& from, const Eigen::Vector2d& to) const;
+  [[nodiscard]] double floor_between(const Eigen::Vector2d& from, const CutterLocation& at_from,
+                                     const Eigen::Vector2d& to, const CutterLocation& at_to) const;
   template <class Visit>
   void visit_cells(const Level& level, const Eigen::AlignedBox2d& axis, const Visit& visit) const;
   void search_level(const Level& level, Search& search) const;

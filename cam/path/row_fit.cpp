@@ -414,14 +414,15 @@ class RowFit {
     const std::size_t settled = error_.size();
     std::size_t best = from + 1;
     double least = HUGE_VAL;
+    const double blunt = kBlunt * options_.slope_tolerance;
     for (std::size_t step = 1; from + step <= last; step *= 2) {
       error_.add(joints_.written[from], RowMove{joints_.written[from + step]});
-      const bool close = error_.is_close(settled, options_.tolerance);
-      const double turn = error_.turn(settled);
+      const bool tried = step == 1 || error_.is_close(settled, options_.tolerance);
+      const double turn = tried ? error_.turn(settled, std::max(least, blunt)) : HUGE_VAL;
       error_.resize(settled);
-      if (step > 1 && !close) break;
+      if (!tried) break;
       // Many moves too short for their decimals are no straighter than one long enough.
-      if (turn < least || (turn < kBlunt * options_.slope_tolerance && too_short(from, best))) {
+      if (turn < least || (turn < blunt && too_short(from, best))) {
         least = turn;
         best = from + step;
       }

@@ -526,19 +526,22 @@ RowError::Turn RowError::most_turn_ahead(std::size_t first, double enough, bool 
 
 /// The difference over a stretch is linear between places where one end of it passes a node: it is
 /// largest at one of them.
-RowError::Turn RowError::most_turn(std::size_t first, bool goes_on) const {
+RowError::Turn RowError::most_turn(std::size_t first, double enough, bool goes_on) const {
   if (nodes_.size() < 2) return {};
   Turn most;
   std::size_t hint = first;
-  for (std::size_t i = first; i < nodes_.size(); ++i) {
+  for (std::size_t i = first; i < nodes_.size() && most.slope <= enough; ++i) {
     const double turn = turn_behind(i, hint);
     if (turn > most.slope) most = {turn, i};
   }
-  const Turn ahead = most_turn_ahead(first, HUGE_VAL, goes_on);
+  if (most.slope > enough) return most;
+  const Turn ahead = most_turn_ahead(first, enough, goes_on);
   return ahead.slope > most.slope ? ahead : most;
 }
 
-double RowError::turn(std::size_t first) const { return most_turn(first, true).slope; }
+double RowError::turn(std::size_t first, double enough) const {
+  return most_turn(first, enough, true).slope;
+}
 
 bool RowError::is_blunt(const Eigen::Vector2d& start, double slope_tolerance) const {
   const double u = start.x() - kSlopeStretch;
@@ -566,7 +569,7 @@ PathCertificate RowError::certificate() const {
     if (gouge > certificate.gouge.value) certificate.gouge = {gouge, place(node)};
     if (excess > certificate.excess.value) certificate.excess = {excess, place(node)};
   }
-  const Turn turn = most_turn(0, false);
+  const Turn turn = most_turn(0, HUGE_VAL, false);
   if (turn.slope > 0.0) certificate.slope = {turn.slope, place(nodes_[turn.node])};
   return certificate;
 }

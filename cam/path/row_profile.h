@@ -146,8 +146,9 @@ class RowError {
   /// True if path and drop curve differ nowhere by more than `tolerance` (mm) from node `first` on.
   [[nodiscard]] bool is_close(std::size_t first, double tolerance) const;
 
-  /// Largest difference of slope from node `first` on, as in add_within().
-  [[nodiscard]] double turn(std::size_t first) const;
+  /// Largest difference of slope from node `first` on, as in add_within(); where one is above
+  /// `enough`, one of those.
+  [[nodiscard]] double turn(std::size_t first, double enough = HUGE_VAL) const;
 
   /// Bounds over the whole row; places are (u, path's height, 0).
   [[nodiscard]] PathCertificate certificate() const;
@@ -185,7 +186,7 @@ class RowError {
   }
   [[nodiscard]] double turn_behind(std::size_t node, std::size_t& hint) const;
   [[nodiscard]] Turn most_turn_ahead(std::size_t first, double enough, bool goes_on) const;
-  [[nodiscard]] Turn most_turn(std::size_t first, bool goes_on) const;
+  [[nodiscard]] Turn most_turn(std::size_t first, double enough, bool goes_on) const;
 
   const RowProfile& profile_;
   std::vector<Node> nodes_;

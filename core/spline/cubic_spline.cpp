@@ -79,9 +79,16 @@ CubicBasis inner_basis(double t, int cell) {
   return basis;
 }
 
+/// The basis at one end, where it is known, with 2 or more cells: of all points of a lens's rim.
+CubicBasis end_basis(bool first, int cells) {
+  if (first) return {0, {1.0}, {-3.0, 3.0}, {6.0, -9.0, 3.0}};
+  return {cells - 1, {0.0, 0.0, 0.0, 1.0}, {0.0, 0.0, -3.0, 3.0}, {0.0, 3.0, -9.0, 6.0}};
+}
+
 }  // namespace
 
 CubicBasis cubic_basis(double t, int cells) {
+  if ((t == 0.0 || t == cells) && cells > 1) return end_basis(t == 0.0, cells);
   const int cell = cell_of(t, cells);
   if (cell >= kSplineDegree - 1 && cell + kSplineDegree <= cells) return inner_basis(t, cell);
   CubicBasis basis;
