@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The finishing raster with its certificate, as cam cuts by default (ball of 0.2 mm, stepover
 // 0.06 mm), on lenses of 100 × 100 mm: 641 × 737 vertices (942,080 triangles) or 321 × 369
-// (235,520).
+// (235,520); and on a spline of 15 × 10 mm with what goes on around it.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 
 #include "bench/process_usage.h"
 #include "cam/cam_meshes.h"
 #include "cam/contact/drop_curve.h"
 #include "cam/path/finish_raster.h"
+#include "core/lens/continued_surface.h"
+#include "core/spline/sample_splines.h"
 
 namespace lensforge {
 namespace {
@@ -97,6 +100,26 @@ void sizes(benchmark::internal::Benchmark* bench) {
 }
 BENCHMARK(FinishFacets)->Apply(sizes);
 BENCHMARK(FinishSmooth)->Apply(sizes);
+
+/// A spline with crowded knots at a corner and its continuation, where the ball follows facets
+/// beyond the rim.
+void FinishBeyondRim(benchmark::State& state) {
+  constexpr double kApron = 0.4;
+  const auto executor = Executor::cpu(2);
+  const auto spline = std::make_shared<const SplineSurface>(testing::crowded_spline());
+  for (auto _ : state) {
+    const double start = bench::cpu_seconds();
+    const SmoothCutSurface surface(continued_surface(spline, 2.0 * kApron, RunOut{}), kRadius,
+                                   kSmoothCut, executor);
+    RasterOptions options;
+    options.apron = kApron;
+    const RasterPlan plan = plan_finish_raster(spline->box(), kRadius, options);
+    const RasterSummary summary = cut_raster(surface, plan, executor, [](const RasterRow&) {}, {});
+    tell(summary, surface.deviation(), bench::cpu_seconds() - start, state);
+    state.counters["facets"] = static_cast<double>(surface.facet_count());
+  }
+}
+BENCHMARK(FinishBeyondRim)->Iterations(1)->UseRealTime()->Unit(benchmark::kSecond);
 
 /// The exact drop curve along rows through the middle of the lens.
 void DropCurveRows(benchmark::State& state) {

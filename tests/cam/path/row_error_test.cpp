@@ -73,6 +73,10 @@ TEST(RowError, AddsWhatIsWithinItsTolerancesAndNothingElse) {
     error.add(at, move);
     EXPECT_EQ(within,
               error.is_close(settled, kTolerance) && error.turn(settled) <= kSlopeTolerance);
+    const double turn = error.turn(settled);
+    EXPECT_EQ(error.turn(settled, turn), turn);
+    const double enough = error.turn(settled, 0.3 * turn);
+    EXPECT_TRUE(enough > 0.3 * turn && enough <= turn) << enough << " of " << turn;
     if (within || refused > 10 * added) {
       at = move.end;
     } else {

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/spline/cubic_spline.h"
 #include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"
 
@@ -25,6 +26,23 @@ Eigen::Vector2d random_parameters(const ControlNet& net, std::mt19937& random) {
   std::uniform_real_distribution<double> unit(0.01, 0.99);
   const double share = unit(random);
   return {share * net.cells().x(), unit(random) * net.cells().y()};
+}
+
+/// At the ends, where the basis is tabulated, it is what it tends to from inside.
+TEST(CubicBasis, EndsAreTheLimitsFromInside) {
+  constexpr double kInside = 1e-9;
+  for (const int cells : {1, 2, 3, 4, 11}) {
+    for (const bool first : {true, false}) {
+      const CubicBasis end = cubic_basis(first ? 0.0 : cells, cells);
+      const CubicBasis near = cubic_basis(first ? kInside : cells - kInside, cells);
+      EXPECT_EQ(end.first, near.first);
+      for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_NEAR(end.value[i], near.value[i], 20.0 * kInside);
+        EXPECT_NEAR(end.slope[i], near.slope[i], 20.0 * kInside);
+        EXPECT_NEAR(end.bend[i], near.bend[i], 20.0 * kInside);
+      }
+    }
+  }
 }
 
 /// Coefficients of a polynomial's B-splines are its blossom at their knots: (ab + ac + bc) / 3 of

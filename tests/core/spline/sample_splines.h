@@ -30,4 +30,27 @@ inline ControlNet sample_spline(double warp = 0.4, double wave = 0.05) {
   return net;
 }
 
+/// The same with knots a few micrometres apart at a corner, as optimal transport leaves them, and
+/// heights that are rough at their scale: derivatives of fourth order reach 1e7/mm³ there.
+inline ControlNet crowded_spline() {
+  ControlNet net = sample_spline();
+  const auto crowd = [&](int i, int j) -> Eigen::Ref<Eigen::Vector3d> {
+    return net.points.col(j * net.shape.columns + i);
+  };
+  for (int k = 1; k <= 3; ++k) {
+    for (int j = 0; j < net.shape.rows; ++j) {
+      crowd(k, j).x() = 0.003 * k;
+      crowd(k, j).z() = crowd(0, j).z();
+    }
+    for (int i = 0; i < net.shape.columns; ++i) {
+      crowd(i, k).y() = 0.003 * k;
+      crowd(i, k).z() = crowd(i, 0).z();
+    }
+  }
+  for (int j = 0; j <= 3; ++j) {
+    for (int i = 0; i <= 3; ++i) crowd(i, j).z() += (i * 7 + j * 5) % 3 == 0 ? 1e-4 : -1e-4;
+  }
+  return net;
+}
+
 }  // namespace lensforge::testing
