@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <optional>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "app/frame/common_output.h"
 #include "core/error.h"
 #include "core/image/image.h"
+#include "core/lens/setup_json.h"
 #include "core/optics/material.h"
 #include "core/optics/picture_blur.h"
 #include "core/schema/json.h"
@@ -31,9 +31,9 @@ using nlohmann::json;
 /// Options of the form, the usual ones first. Those that name files are not among them: a page
 /// reaches nothing but its project.
 constexpr std::array kFormOptions{
-    "--lamp",        "--material", "--width",   "--focal",   "--image-width", "--pixels",
-    "--thickness",   "--outline",  "--quality", "--model",   "--light-model", "--image-offset",
-    "--screen-tilt", "--view",     "--mode",    "--fresnel", "--background"};
+    "--lamp",        "--material", "--width",   "--focal",     "--image-width", "--pixels",
+    "--thickness",   "--outline",  "--quality", "--model",     "--light-model", "--image-offset",
+    "--screen-tilt", "--view",     "--mode",    "--incidence", "--fresnel",     "--background"};
 
 const char* kind_word(FieldKind kind) {
   switch (kind) {
@@ -186,15 +186,6 @@ json set_key(Workshop& workshop, const std::string& name, const json& value) {
   return taken;
 }
 
-json widths_json(const OpticalSetup& setup) {
-  const std::optional<Eigen::Vector3d> lamp = lamp_place(setup.lamp);
-  const double width = setup.extent.width;
-  const bool none = setup.extent.none();
-  return {{"lamp_mm", lamp ? json(std::abs(lamp->z())) : json()},
-          {"lamp_width_mm", lamp && !none ? json(width) : json()},
-          {"lamp_angle_rad", !lamp && !none ? json(width) : json()}};
-}
-
 }  // namespace
 
 json studio_forms() { return {{"light", light_fields()}, {"workshop", workshop_sections()}}; }
@@ -258,17 +249,14 @@ json wish_json(const ProposalWish& wish, const Eigen::Vector2i& picture) {
   validate(design, Image(pixels.x(), pixels.y(), 1.0F));
   const OpticalSetup setup = optical_setup(design, pixels);
   const std::vector<PictureBlur> blurs = blurs_of(wish, setup);
-  json wanted{{"lens_mm", {setup.lens_size.x(), setup.lens_size.y()}},
-              {"picture_mm", {setup.image_size.x(), setup.image_size.y()}},
-              {"focal_mm", design.focal_length},
-              {"thickness_mm", design.thickness},
-              {"mirror", traits(setup.body).lit_from_above},
-              {"pixels", {pixels.x(), pixels.y()}},
-              {"blurs", blurs_json(blurs)},
-              {"sharp_pixels", sharp_pixels(wish, picture)},
-              {"words", blur_words(blurs)}};
-  wanted.update(widths_json(setup));
-  return wanted;
+  return {{"setup", json(setup_json(setup))},
+          {"lens_mm", {setup.lens_size.x(), setup.lens_size.y()}},
+          {"focal_mm", design.focal_length},
+          {"thickness_mm", design.thickness},
+          {"pixels", {pixels.x(), pixels.y()}},
+          {"blurs", blurs_json(blurs)},
+          {"sharp_pixels", sharp_pixels(wish, picture)},
+          {"words", blur_words(blurs)}};
 }
 
 }  // namespace lensforge::app

@@ -33,7 +33,8 @@ nlohmann::json changed_workshop(nlohmann::json values, const nlohmann::json& cha
 /// The default workshop with these values. @throw InputError as changed_workshop().
 Workshop workshop_with(const nlohmann::json& values);
 
-/// Sizes of lens, picture and lamp, and the blurs of each cause. @param picture  its size, pixels.
+/// The optical setup as lens.json has it, what a page shows of its sizes, and the blur of each
+/// cause. @param picture  its size, pixels.
 /// @throw InputError naming option, value and rule.
 nlohmann::json wish_json(const ProposalWish& wish, const Eigen::Vector2i& picture);
 

@@ -3,6 +3,7 @@
 // studio keeps.
 #include <httplib.h>
 
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <functional>
@@ -235,12 +236,26 @@ TEST_F(Studio, SaysTheBlursBeforeAnyDesign) {
   browser.post("/projects/" + name + "/settings",
                json{{"settings", {{"--lamp", "led:3mm@600mm"}, {"--focal", 200}}}});
   const json light = browser.state(name)["light"];
-  EXPECT_EQ(light["lamp_mm"], 600.0);
+  EXPECT_EQ(light["setup"]["source"]["position"][2], -600.0);
   // The image of 3 mm through the middle of the lens, whose 5 mm are as 5 / 1.49 of air.
-  const double pixel = light["picture_mm"][0].get<double>() / light["pixels"][0].get<double>();
+  const double pixel =
+      light["setup"]["image_size"][0].get<double>() / light["pixels"][0].get<double>();
   const double image = 3.0 * (200.0 - 5.0) / (600.0 + 5.0 / 1.49);
   EXPECT_EQ(light["blurs"][0]["cause"], "lamp");
   EXPECT_NEAR(light["blurs"][0]["pixels"].get<double>(), image / pixel, 0.01);
+}
+
+TEST_F(Studio, TellsThePageWhereAMirrorsPictureIs) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const json mirror{{"--mode", "reflect"}, {"--incidence", 45}, {"--focal", 200}, {"--width", 50}};
+  browser.post("/projects/" + name + "/settings", json{{"settings", mirror}});
+  const json setup = browser.state(name)["light"]["setup"];
+  EXPECT_EQ(setup["mode"], "reflect");
+  // Light from the left at 45 degrees goes as far to the right as it goes up from the mirror.
+  const double right = setup["screen"]["centre"][0].get<double>() - 25.0;
+  EXPECT_NEAR(right, 200.0, 5.5);
+  EXPECT_NEAR(setup["source"]["direction"][0].get<double>(), std::sqrt(0.5), 1e-9);
 }
 
 TEST_F(Studio, LeadsFromPictureToASentProgram) {

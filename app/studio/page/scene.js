@@ -24,24 +24,54 @@ function project(point, view, middle, distance) {
   return [scale * dot(from, view.right), -scale * dot(from, view.up)];
 }
 
-// The corners of a rectangle across the light, as a viewer in front of the wall reads: from the top left.
-function rectangle(size, z) {
-  const [w, h] = [size[0] / 2, size[1] / 2];
-  return [[w, h, z], [-w, h, z], [-w, -h, z], [w, -h, z]];
+const times = (v, factor) => v.map((value) => factor * value);
+const plus = (...vectors) => [0, 1, 2].map((i) => vectors.reduce((sum, v) => sum + v[i], 0));
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const norm = (v) => Math.hypot(...v);
+const unit = (v) => times(v, 1 / norm(v));
+
+// The corners of a rectangle, from the top left of one who sees `right` on the right.
+function rectangle(size, centre, right = [-1, 0, 0], up = [0, 1, 0]) {
+  const x = times(right, size[0] / 2), y = times(up, size[1] / 2);
+  return [plus(centre, times(x, -1), y), plus(centre, x, y), plus(centre, x, times(y, -1)), plus(centre, times(x, -1), times(y, -1))];
 }
 
-// ---- What there is, in millimetres ----
+// ---- What there is, in millimetres from the middle of the part ----
+const extent = (points, axis) => [Math.min(...points.map((p) => p[axis])), Math.max(...points.map((p) => p[axis]))];
+
+// The lamp: its place, which parallel light does not have, its size there and how far it is.
+function layoutOfLamp(setup, middle, wall, drawn) {
+  const source = setup.source, size = source.size_mm || 0;
+  if (!source.position) {
+    const words = source.angle_mrad ? `parallel light, ${number(source.angle_mrad, 3)} mrad` : "parallel light";
+    return { at: times(source.direction, -0.75 * norm(wall)), size: setup.lens_size, parallel: true, words };
+  }
+  const offset = plus(source.position, middle);
+  return { at: drawn(offset), size: [size, size], mm: norm(offset), parallel: false };
+}
+
+// `light` has the optical setup as lens.json has it. Light goes along rectangles: from the lamp to the face where it
+// enters, from the face where it leaves to the picture.
 function layout(light) {
-  const largest = Math.max(...light.lens_mm, ...light.picture_mm);
-  const drawn = (distance) => Math.min(distance, kFarthest * largest);
-  const wall = drawn(light.focal_mm);
-  const lamp = light.lamp_mm === null ? 0.75 * wall : drawn(light.lamp_mm);
-  const lampSize = light.lamp_mm === null ? light.lens_mm : [light.lamp_width_mm || 0, light.lamp_width_mm || 0];
-  return { largest, wall, lamp, lampSize, floor: -0.62 * Math.max(light.lens_mm[1], light.picture_mm[1]),
-    side: 0.62 * Math.max(light.lens_mm[0], light.picture_mm[0]), thick: Math.min(light.thickness_mm, 0.4 * wall) };
+  const { lens_size: size, screen, mode } = light.setup, middle = [-size[0] / 2, -size[1] / 2, 0];
+  const largest = Math.max(...size, ...screen.size), mirror = mode === "reflect";
+  const drawn = (offset) => times(offset, Math.min(1, kFarthest * largest / norm(offset)));
+  const offset = plus(screen.centre, middle), wall = drawn(offset), lamp = layoutOfLamp(light.setup, middle, wall, drawn);
+  const thick = mirror ? -0.05 * Math.max(...size) : Math.min(light.thickness_mm, 0.4 * norm(wall));
+  const across = lamp.parallel ? [-1, 0, 0] : unit(cross(lamp.at[2] > 0 ? lamp.at : times(lamp.at, -1), [0, 1, 0]));
+  const lampUp = lamp.parallel ? [0, 1, 0] : unit(cross(across, lamp.at[2] > 0 ? lamp.at : times(lamp.at, -1)));
+  const shapes = { lamp: rectangle(lamp.size, lamp.at, across, lampUp), enter: rectangle(size, [0, 0, 0]), leave: rectangle(size, [0, 0, Math.max(thick, 0)]),
+    other: rectangle(size, [0, 0, thick]), picture: rectangle(screen.size, wall, screen.right, screen.up) };
+  // Light does not change sides on its way to a picture that is seen from behind.
+  shapes.landing = screen.right[0] < 0 ? shapes.picture : [1, 0, 3, 2].map((i) => shapes.picture[i]);
+  const ends = [...shapes.enter, ...shapes.picture, ...shapes.lamp], border = 0.12 * Math.max(screen.size[0], size[0]);
+  const sides = extent(ends, 0), along = extent(ends, 2), floor = extent(ends, 1)[0] - 0.12 * Math.max(screen.size[1], size[1]);
+  shapes.wall = rectangle([0, 1].map((i) => 1.24 * Math.max(size[i], screen.size[i])), wall, screen.right, screen.up);
+  return { shapes, lamp, wall, wallMm: norm(offset), mirror, floor, along, sides: [sides[0] - border, sides[1] + border],
+    normal: cross(screen.right, screen.up) };
 }
 
-const lineWords = (distance, drawn) => millimetres(distance) + (drawn < distance ? ", drawn shorter" : "");
+const lineWords = (distance, drawn) => `${number(distance, 3)} mm` + (drawn < 0.999 * distance ? ", drawn shorter" : "");
 
 // ---- Shapes: text of SVG. `at` projects a point to "x,y". ----
 const face = (points, at, kind) => `<polygon class="${kind}" points="${points.map(at).join(" ")}"/>`;
@@ -63,56 +93,58 @@ function beam(from, to, at, kind) {
 }
 
 function floorLines(room, at) {
-  const from = -room.lamp, to = room.wall, step = (to - from) / 8, wide = room.side;
+  const [left, right] = room.sides, [from, to] = room.along, step = (to - from) / 8;
   let lines = "";
-  for (let i = 0; i <= 8; ++i) lines += line([-wide, room.floor, from + i * step], [wide, room.floor, from + i * step], at, "floor");
-  for (let i = -2; i <= 2; ++i) lines += line([i * wide / 2, room.floor, from], [i * wide / 2, room.floor, to], at, "floor");
+  for (let i = 0; i <= 8; ++i) lines += line([left, room.floor, from + i * step], [right, room.floor, from + i * step], at, "floor");
+  for (let i = 0; i <= 4; ++i) lines += line([left + i * (right - left) / 4, room.floor, from], [left + i * (right - left) / 4, room.floor, to], at, "floor");
   return lines;
 }
 
-function lensShape(light, room, at) {
-  const back = rectangle(light.lens_mm, 0), front = rectangle(light.lens_mm, room.thick);
-  return face(back, at, "glass") + beam(back, front, at, "glass") + face(front, at, "glass lit");
+// A plate with its back, its edges and, towards the eye, its front.
+function partShape({ shapes, mirror }, at, view) {
+  const kind = mirror ? "mirror" : "glass", lit = mirror ? "mirror silver" : "glass lit";
+  const sides = beam(shapes.enter, shapes.other, at, kind);
+  if (!mirror) return face(shapes.enter, at, kind) + sides + face(shapes.other, at, lit);
+  return view.forward[2] > 0 ? face(shapes.enter, at, lit) + sides + face(shapes.other, at, kind)
+    : face(shapes.other, at, kind) + sides + face(shapes.enter, at, lit);
 }
 
-function lampShape(light, room, at) {
-  if (light.lamp_mm === null) return rectangle(light.lens_mm, -room.lamp).map((corner) => line(corner, [corner[0], corner[1], 0], at, "ray")).join("");
-  const [x, y] = at([0, 0, -room.lamp]).split(",");
-  const edge = at([room.lampSize[0] / 2, 0, -room.lamp]).split(","), up = at([0, room.lampSize[1] / 2, -room.lamp]).split(",");
-  const radius = Math.max(3, Math.hypot(edge[0] - x, edge[1] - y), Math.hypot(up[0] - x, up[1] - y));
+function lampShape({ lamp, shapes }, at) {
+  if (lamp.parallel) return shapes.lamp.map((corner, i) => line(corner, shapes.enter[i], at, "ray")).join("");
+  const [x, y] = at(lamp.at).split(","), corners = shapes.lamp.map((corner) => at(corner).split(","));
+  const radius = Math.max(3, ...corners.map((corner) => Math.SQRT1_2 * Math.hypot(corner[0] - x, corner[1] - y)));
   return `<circle class="glow" cx="${x}" cy="${y}" r="${3.2 * radius}"/><circle class="bulb" cx="${x}" cy="${y}" r="${radius}"/>`;
 }
 
-function lightShapes(light, room, at) {
-  const lens = rectangle(light.lens_mm, 0), out = rectangle(light.lens_mm, room.thick), wall = rectangle(light.picture_mm, room.wall);
-  const start = light.lamp_mm === null ? rectangle(light.lens_mm, -room.lamp) : rectangle(room.lampSize, -room.lamp);
-  const rays = out.map((corner, i) => line(corner, wall[i], at, "ray")).join("");
-  return { before: beam(start, lens, at, "beam"), behind: beam(out, wall, at, "beam") + rays };
+function lightShapes({ shapes }, at) {
+  const rays = shapes.leave.map((corner, i) => line(corner, shapes.landing[i], at, "ray")).join("");
+  return { before: beam(shapes.lamp, shapes.enter, at, "beam"), behind: beam(shapes.leave, shapes.landing, at, "beam") + rays };
 }
 
-// Distances stand on the floor, on the side that is nearer to the eye.
-function measures(light, room, at, view) {
-  const x = (view.forward[0] > 0 ? -1 : 1) * room.side, y = room.floor;
-  const bar = (from, to) => [[x, y, from], [x, y, to]].map((p) => line([0.94 * p[0], y, p[2]], [1.06 * p[0], y, p[2]], at, "measure")).join("") +
-    line([x, y, from], [x, y, to], at, "measure");
-  const middle = (from, to) => [1.1 * x, y, (from + to) / 2];
-  const lampWords = light.lamp_mm === null ? "parallel light" : lineWords(light.lamp_mm, room.lamp);
-  return (light.lamp_mm === null ? "" : bar(-room.lamp, 0)) + bar(0, room.wall) + label(middle(-room.lamp, 0), at, lampWords, "", 18) +
-    label(middle(0, room.wall), at, lineWords(light.focal_mm, room.wall), "", 18);
+// Distances are measured on the floor: for a lens on the side that is nearer to the eye, for a mirror below the light.
+function measures(room, at, view) {
+  const x = room.mirror ? 0 : room.sides[view.forward[0] > 0 ? 0 : 1], mark = 0.02 * (room.sides[1] - room.sides[0]);
+  const foot = (point) => [point[0] + x, room.floor, point[2]], start = foot([0, 0, 0]);
+  const tick = (p) => line([p[0] - mark, p[1], p[2]], [p[0] + mark, p[1], p[2]], at, "measure");
+  const bar = (end) => tick(start) + tick(end) + line(start, end, at, "measure");
+  const words = (end, text) => label(plus(times(plus(start, end), 0.5), [room.mirror ? 0 : Math.sign(x) * mark, 0, 0]), at, text, "", 18);
+  const lampWords = room.lamp.parallel ? room.lamp.words : lineWords(room.lamp.mm, norm(room.lamp.at));
+  return (room.lamp.parallel ? "" : bar(foot(room.lamp.at))) + bar(foot(room.wall)) + words(foot(room.lamp.at), lampWords) +
+    words(foot(room.wall), lineWords(room.wallMm, norm(room.wall)));
 }
 
 // Names stand above the highest corner of their thing.
-function nameAbove(size, z, at, words) {
-  const corners = rectangle(size, z).map((p) => at(p).split(",").map(Number));
-  const x = corners.reduce((sum, p) => sum + p[0] / 4, 0), y = Math.min(...corners.map((p) => p[1])) - 10;
+function nameAbove(corners, at, words) {
+  const places = corners.map((p) => at(p).split(",").map(Number));
+  const x = places.reduce((sum, p) => sum + p[0] / 4, 0), y = Math.min(...places.map((p) => p[1])) - 10;
   return textAt(x, y, words, "named");
 }
 
 function names(light, room, at) {
-  const lamp = light.lamp_mm === null ? "" : label([0, room.lampSize[1] / 2, -room.lamp], at,
-    light.lamp_width_mm ? `lamp ${millimetres(light.lamp_width_mm)}` : "lamp", "named", -16);
-  return lamp + nameAbove(light.lens_mm, 0, at, `lens ${sizeText(light.lens_mm)}`) +
-    nameAbove(light.picture_mm, room.wall, at, `picture ${sizeText(light.picture_mm)}`);
+  const { lamp, shapes } = room, { lens_size: size, screen } = light.setup;
+  const lampName = lamp.parallel ? "" : label(plus(lamp.at, [0, lamp.size[1] / 2, 0]), at, lamp.size[0] ? `lamp ${millimetres(lamp.size[0])}` : "lamp", "named", -16);
+  return lampName + nameAbove(shapes.enter, at, `${room.mirror ? "mirror" : "lens"} ${sizeText(size)}`) +
+    nameAbove(shapes.picture, at, `picture ${sizeText(screen.size)}`);
 }
 
 // ---- Drawing ----
@@ -122,12 +154,12 @@ const kSceneParts = `<defs><radialGradient id="glow"><stop offset="0" stop-color
   <g></g><image width="1" height="1" preserveAspectRatio="none"/><g></g>`.replace(/>\s+</g, "><");
 
 // Fits everything that is measured into the frame, whatever the angle.
-function fitted(light, room, view, width, height) {
-  const middle = (room.wall - room.lamp) / 2, distance = 4 * Math.max(room.wall + room.lamp, room.largest);
-  const points = [...rectangle([2.1 * room.side, 2 * -room.floor], room.wall), ...rectangle([2.1 * room.side, 2 * -room.floor], 0),
-    [-1.1 * room.side, room.floor, -room.lamp], [1.1 * room.side, room.floor, -room.lamp], [0, room.lampSize[1] / 2, -room.lamp]];
+function fitted(room, view, width, height) {
+  const { shapes, along, sides, floor } = room, middle = (along[0] + along[1]) / 2;
+  const points = [...shapes.wall, ...shapes.enter, ...(room.lamp.parallel ? [] : shapes.lamp), ...along.flatMap((z) => sides.map((x) => [x, floor, z]))];
+  const distance = 4 * Math.max(along[1] - along[0], sides[1] - sides[0]);
   const flat = points.map((p) => project(p, view, middle, distance));
-  const bounds = [0, 1].map((axis) => [Math.min(...flat.map((p) => p[axis])), Math.max(...flat.map((p) => p[axis]))]);
+  const bounds = [0, 1].map((axis) => extent(flat, axis));
   const scale = Math.min((width - 70) / (bounds[0][1] - bounds[0][0]), (height - 76) / (bounds[1][1] - bounds[1][0]));
   const offset = [width / 2 - scale * (bounds[0][0] + bounds[0][1]) / 2, height / 2 - scale * (bounds[1][0] + bounds[1][1]) / 2];
   return (point) => {
@@ -137,8 +169,8 @@ function fitted(light, room, view, width, height) {
 }
 
 // The affine map that is nearest to the perspective of the picture's corners.
-function picturePlace(light, room, at) {
-  const [a, b, c, d] = rectangle(light.picture_mm, room.wall).map((p) => at(p).split(",").map(Number));
+function picturePlace(corners, at) {
+  const [a, b, c, d] = corners.map((p) => at(p).split(",").map(Number));
   const across = [0, 1].map((i) => (b[i] - a[i] + c[i] - d[i]) / 2), down = [0, 1].map((i) => (d[i] - a[i] + c[i] - b[i]) / 2);
   const corner = [0, 1].map((i) => (a[i] + b[i] + c[i] + d[i]) / 4 - across[i] / 2 - down[i] / 2);
   return `matrix(${[...across, ...down, ...corner].map((v) => v.toFixed(3)).join(" ")})`;
@@ -150,14 +182,15 @@ function drawScene() {
   scene.width = width;
   if (!svg.firstChild) svg.innerHTML = kSceneParts;
   const [, below, image, above] = svg.children, room = layout(light), view = camera(scene.yaw, scene.pitch);
-  const at = fitted(light, room, view, width, height), shapes = lightShapes(light, room, at), seen = view.forward[2] > 0;
-  const wall = face(rectangle([2 * room.side, -2 * room.floor], room.wall), at, seen ? "wall" : "wall behind");
-  const lens = lensShape(light, room, at), lamp = lampShape(light, room, at);
-  const words = measures(light, room, at, view) + names(light, room, at);
+  const at = fitted(room, view, width, height), shapes = lightShapes(room, at);
+  // What is farther from the eye is drawn first.
+  const far = dot(room.wall, view.forward) > 0, seen = dot(room.normal, view.forward) < 0;
+  const wall = face(room.shapes.wall, at, seen ? "wall" : "wall behind"), part = partShape(room, at, view), lamp = lampShape(room, at);
+  const things = dot(room.lamp.at, view.forward) < 0 ? part + shapes.before + lamp : shapes.before + lamp + part;
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  below.innerHTML = floorLines(room, at) + (seen ? wall : shapes.before + lamp + lens + shapes.behind + wall);
-  above.innerHTML = (seen ? shapes.behind + lens + shapes.before + lamp : "") + words;
-  image.setAttribute("transform", picturePlace(light, room, at));
+  below.innerHTML = floorLines(room, at) + (far ? wall : things + shapes.behind + wall);
+  above.innerHTML = (far ? shapes.behind + things : "") + measures(room, at, view) + names(light, room, at);
+  image.setAttribute("transform", picturePlace(room.shapes.picture, at));
   // From behind, the picture shines through the wall.
   image.setAttribute("opacity", seen ? 1 : 0.3);
   if (scene.picture && image.getAttribute("href") !== scene.picture) image.setAttribute("href", scene.picture);
@@ -165,10 +198,11 @@ function drawScene() {
 
 function sceneWords(light) {
   if (light.error) return "";
-  const lamp = light.lamp_mm === null ? "Parallel light" : `A lamp${light.lamp_width_mm ? ` of ${millimetres(light.lamp_width_mm)}` : ""}, ${millimetres(light.lamp_mm)} before the lens,`;
-  const angle = light.lamp_angle_rad ? ` of ${number(1e3 * light.lamp_angle_rad, 3)} mrad` : "";
-  return `${lamp}${light.lamp_mm === null ? angle : ""} shines on a lens of ${sizeText(light.lens_mm)}, at least ${millimetres(light.thickness_mm)} thick. ` +
-    `Its picture of ${sizeText(light.picture_mm)} is on a wall ${millimetres(light.focal_mm)} away.`;
+  const { source, screen, lens_size: size } = light.setup, { lamp, mirror, wallMm } = layout(light);
+  const width = source.size_mm ? ` of ${millimetres(source.size_mm)}` : "", angle = source.angle_mrad ? ` of ${number(source.angle_mrad, 3)} mrad` : "";
+  const from = lamp.parallel ? `Parallel light${angle}` : `A lamp${width}, ${millimetres(lamp.mm)} before the ${mirror ? "mirror" : "lens"},`;
+  const part = mirror ? `a mirror of ${sizeText(size)}` : `a lens of ${sizeText(size)}, at least ${millimetres(light.thickness_mm)} thick`;
+  return `${from} shines on ${part}. Its picture of ${sizeText(screen.size)} is on a wall ${millimetres(wallMm)} away.`;
 }
 
 // The last scene that could be drawn stays while settings are refused.
