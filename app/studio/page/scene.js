@@ -58,9 +58,9 @@ function layout(light) {
   const drawn = (offset) => times(offset, Math.min(1, kFarthest * largest / norm(offset)));
   const offset = plus(screen.centre, middle), wall = drawn(offset), lamp = layoutOfLamp(light.setup, middle, wall, drawn);
   const thick = mirror ? -0.05 * Math.max(...size) : Math.min(light.thickness_mm, 0.4 * norm(wall));
-  const across = lamp.parallel ? [-1, 0, 0] : unit(cross(lamp.at[2] > 0 ? lamp.at : times(lamp.at, -1), [0, 1, 0]));
-  const lampUp = lamp.parallel ? [0, 1, 0] : unit(cross(across, lamp.at[2] > 0 ? lamp.at : times(lamp.at, -1)));
-  const shapes = { lamp: rectangle(lamp.size, lamp.at, across, lampUp), enter: rectangle(size, [0, 0, 0]), leave: rectangle(size, [0, 0, Math.max(thick, 0)]),
+  // A lamp at a place faces the part, parallel light is as wide as the part.
+  const axis = lamp.parallel ? [0, 0, 1] : times(lamp.at, Math.sign(lamp.at[2])), across = unit(cross(axis, [0, 1, 0]));
+  const shapes = { lamp: rectangle(lamp.size, lamp.at, across, unit(cross(across, axis))), enter: rectangle(size, [0, 0, 0]), leave: rectangle(size, [0, 0, Math.max(thick, 0)]),
     other: rectangle(size, [0, 0, thick]), picture: rectangle(screen.size, wall, screen.right, screen.up) };
   // Light does not change sides on its way to a picture that is seen from behind.
   shapes.landing = screen.right[0] < 0 ? shapes.picture : [1, 0, 3, 2].map((i) => shapes.picture[i]);
@@ -71,7 +71,7 @@ function layout(light) {
     normal: cross(screen.right, screen.up) };
 }
 
-const lineWords = (distance, drawn) => `${number(distance, 3)} mm` + (drawn < 0.999 * distance ? ", drawn shorter" : "");
+const lineWords = (distance, drawn) => millimetres(distance) + (drawn < 0.999 * distance ? ", drawn shorter" : "");
 
 // ---- Shapes: text of SVG. `at` projects a point to "x,y". ----
 const face = (points, at, kind) => `<polygon class="${kind}" points="${points.map(at).join(" ")}"/>`;
