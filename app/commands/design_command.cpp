@@ -58,9 +58,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The options of `cam` that determine the milled part.
+/// Which part is made: those of `cam`, or a print.
 Description part_options(CamOptions& cut) {
-  return description_of(cut).only({"--part", "--shrinkage"});
+  Description options;
+  options.word(
+      "--part", cut.part,
+      {{"lens", PartKind::kLens}, {"mould", PartKind::kMould}, {"print", PartKind::kPrint}},
+      "mill the lens or the mould to cast it in, or print the lens and level it with a "
+      "film");
+  options.add(description_of(cut).at("--shrinkage"));
+  return options;
 }
 
 /// @throw InputError unless nothing is said of how a part is made.
@@ -498,18 +505,23 @@ nlohmann::json summary_json(const fs::path& folder, const DesignResult& result) 
   return summary;
 }
 
-/// Why cam's figure of the same part is another one.
-constexpr const char* kMadeWords =
-    "          as cut and polished on average; cam adds its paths' errors and what the ball "
-    "rounds\n";
+/// Why cam's or plan's figure of the same part is another one.
+const char* made_words(const DesignSettings& settings) {
+  return settings.cut.part == PartKind::kPrint
+             ? "          as printed and levelled, without steps; plan says what they add\n"
+             : "          as cut and polished on average; cam adds its paths' errors and what the "
+               "ball rounds\n";
+}
 
-std::string summary_text(const fs::path& folder, const DesignResult& result) {
+std::string summary_text(const fs::path& folder, const DesignSettings& settings,
+                         const DesignResult& result) {
   const Lens& lens = result.lens;
   return folder.string() + ": " + result.message + "\n" +  //
          metrics_text(lens) +                              //
          (result.colors ? fringe_text(result.colors->fringe) : "") +
-         (result.made ? "  made    " + metrics_text(result.made->metrics) + "\n" + kMadeWords
-                      : "") +
+         (result.made
+              ? "  made    " + metrics_text(result.made->metrics) + "\n" + made_words(settings)
+              : "") +
          (result.wall ? "  by waves " + metrics_text(result.wall->metrics) + "\n" : "") +
          "  on the wall " + blur_words(blurs_of(lens)) + "\n  " +
          size_text(lens.setup.pixels.x(), lens.setup.pixels.y()) + " pixels, " +
@@ -517,8 +529,13 @@ std::string summary_text(const fs::path& folder, const DesignResult& result) {
          fixed(lens.provenance.json()["seconds"].get<double>(), 1) + " s\n";
 }
 
-/// The command that cuts the lens, in the workshop that it was designed for.
-std::string cam_words(const DesignSettings& settings, const fs::path& folder) {
+/// The command that cuts the lens, in the workshop that it was designed for, or hands it to a
+/// printer.
+std::string making_words(const DesignSettings& settings, const fs::path& folder) {
+  if (settings.cut.part == PartKind::kPrint) {
+    return "lensforge export " + shell_word(folder.string()) + " --out " +
+           shell_word(folder.string() + ".stl");
+  }
   const bool named = !settings.made_by.empty() && settings.made_by != "default";
   return "lensforge cam " + shell_word(folder.string()) +
          (named ? " --workshop " + shell_word(settings.made_by) : std::string());
@@ -539,14 +556,14 @@ CommandResult finish(CommandFrame& frame, const ChosenDevice& device,
   }
   std::error_code ignored;
   if (done) fs::remove(folder / lens_file::kCheckpoint, ignored);
-  CommandResult outcome{summary_json(folder, result), summary_text(folder, result),
+  CommandResult outcome{summary_json(folder, result), summary_text(folder, settings, result),
                         exit_code(done)};
   if (keeps) {
     outcome.notes.push_back(folder.string() + " keeps its earlier lens until the new one is done");
   }
   if (done) {
     outcome.notes.push_back("look at " + (folder / lens_file::kOverview).string() +
-                            "; then: " + cam_words(settings, folder));
+                            "; then: " + making_words(settings, folder));
   } else {
     outcome.notes.emplace_back(kContinueWithResume);
   }

@@ -52,6 +52,9 @@ void describe(Description& d, PlanSettings& settings) {
   d.text("--made-by", settings.made_by, "default|FILE.toml",
          "the workshop that cuts and polishes the lens")
       .essential = true;
+  d.word("--part", settings.wish.cut.part, {{"lens", PartKind::kLens}, {"print", PartKind::kPrint}},
+         "mill the lens, or print it on the workshop's printer and level it with a film")
+      .essential = true;
   d.number("--hours", settings.wish.hours, Limits::between(0.1, 1000.0), "h",
            "on the machine at most, where --width is not given")
       .essential = true;
@@ -106,15 +109,29 @@ nlohmann::json values_json(const OptionValues& values) {
 
 struct Commands {
   std::string design;
-  std::string cam;
+  std::string make;
 };
 
 Commands commands_of(const Proposal& proposal, const PlanSettings& settings) {
+  const std::string design =
+      "lensforge design " + shell_word(settings.target) + typed(options_of(proposal));
+  const std::string shop = shell_word(settings.made_by);
+  if (settings.wish.printed()) {
+    return {design + " --made-by " + shop + " --part print --out lens",
+            "lensforge export lens --out lens.stl"};
+  }
   const bool own = settings.made_by != "default";
-  return {"lensforge design " + shell_word(settings.target) + typed(options_of(proposal)) +
-              " --out lens",
-          std::string("lensforge cam lens") +
-              (own ? " --workshop " + shell_word(settings.made_by) : "")};
+  return {design + " --out lens",
+          std::string("lensforge cam lens") + (own ? " --workshop " + shop : "")};
+}
+
+nlohmann::json print_json(const PrintForecast& print) {
+  const Eigen::Vector3d& box = print.run.box;
+  return {{"box_mm", {box.x(), box.y(), box.z()}},
+          {"layers", print.run.layers},
+          {"steps_mae", print.steps_mae},
+          {"terrace_mm", print.terraces.width},
+          {"terrace_share", print.terraces.share}};
 }
 
 nlohmann::json json_of(const Proposal& proposal, const PlanSettings& settings) {
@@ -125,25 +142,68 @@ nlohmann::json json_of(const Proposal& proposal, const PlanSettings& settings) {
   }
   const Commands commands = commands_of(proposal, settings);
   const DesignOptions& design = proposal.design;
-  return {{"title", proposal.title},
-          {"words", proposal.words},
-          {"width_mm", design.width},
-          {"focal_mm", design.focal_length},
-          {"image_width_mm", picture_width(design)},
-          {"pixels", design.pixels},
-          {"sharp_pixels", f.sharp_pixels},
-          {"blur", blurs_json(f.blurs)},
-          {"light_model", f.waves ? "waves" : "rays"},
-          {"mae", f.mae},
-          {"leakage", f.leakage},
-          {"contrast", f.contrast},
-          {"relief_mm", f.relief},
-          {"sheet_mm", f.sheet > 0.0 ? nlohmann::json(f.sheet) : nlohmann::json()},
-          {"operations", operations},
-          {"minutes", f.minutes()},
-          {"design_seconds", f.design_seconds},
-          {"options", values_json(options_of(proposal))},
-          {"commands", {commands.design, commands.cam}}};
+  nlohmann::json json = {{"title", proposal.title},
+                         {"words", proposal.words},
+                         {"width_mm", design.width},
+                         {"focal_mm", design.focal_length},
+                         {"image_width_mm", picture_width(design)},
+                         {"pixels", design.pixels},
+                         {"sharp_pixels", f.sharp_pixels},
+                         {"blur", blurs_json(f.blurs)},
+                         {"light_model", f.waves ? "waves" : "rays"},
+                         {"mae", f.mae},
+                         {"leakage", f.leakage},
+                         {"contrast", f.contrast},
+                         {"relief_mm", f.relief},
+                         {"sheet_mm", f.sheet > 0.0 ? nlohmann::json(f.sheet) : nlohmann::json()},
+                         {"operations", operations},
+                         {"minutes", f.minutes()},
+                         {"design_seconds", f.design_seconds},
+                         {"options", values_json(options_of(proposal))},
+                         {"commands", {commands.design, commands.make}}};
+  if (f.print) json["print"] = print_json(*f.print);
+  return json;
+}
+
+/// A length that may be far below a millimetre: three digits.
+std::string short_length(double mm) { return number_text(mm, 3) + " mm"; }
+
+/// More of a lens than this shows steps, not the picture.
+constexpr double kMostTerraces = 0.5;
+
+/// What the print's steps do to the picture, and what it takes that they do not.
+std::string steps_text(const Proposal& proposal, const Printer& printer) {
+  const ProposalForecast& f = proposal.forecast;
+  const Terraces& terraces = f.print->terraces;
+  const double spread = f.blurs.back().pixels;  // print_blurs() ends with the steps.
+  if (terraces.share == 0.0) return "\n  steps     the film levels them within a pixel";
+  std::string text = terraces.share > kMostTerraces
+                         ? "\n  steps     this print does not show the picture: terraces"
+                         : "\n  steps     terraces";
+  text += " wider than " + short_length(terraces.width) + ", on " + percent_text(terraces.share) +
+          " of the lens, stay under the film and spread light over up to " + fixed(spread, 1) +
+          " pixels, which is " + fixed(f.print->steps_mae, 4) + " of the MAE; ";
+  text += (printer.upright ? "pixels of " : "layers of ") + short_length(printer.step() / spread);
+  const double wall = proposal.design.focal_length / spread;
+  if (wall >= proposal.design.width) text += " or a wall at " + short_length(wall);
+  return text + " would keep that within a pixel";
+}
+
+std::string print_text(const Proposal& proposal, const Printer& printer) {
+  const PrintRun& run = proposal.forecast.print->run;
+  return "\n  print     relief " + fixed(proposal.forecast.relief, 1) + " mm on " +
+         number_text(proposal.design.thickness) + " mm: " + std::to_string(run.layers) +
+         " layers of " + number_text(printer.layer) + " mm, " + fixed(run.box.x(), 0) + " x " +
+         fixed(run.box.y(), 0) + " mm on the bed, " + fixed(run.box.z(), 0) + " mm high";
+}
+
+std::string blank_text(const Proposal& proposal) {
+  const ProposalForecast& f = proposal.forecast;
+  return "\n  blank     relief " + fixed(f.relief, 1) + " mm on " +
+         number_text(proposal.design.thickness) + " mm: " +
+         (f.sheet > 0.0
+              ? "a sheet of " + number_text(f.sheet) + " mm"
+              : std::string("thicker than every sheet on sale; a farther wall needs less"));
 }
 
 std::string text_of(const Proposal& proposal, const PlanSettings& settings) {
@@ -162,11 +222,9 @@ std::string text_of(const Proposal& proposal, const PlanSettings& settings) {
   text += "\n  expect    MAE about " + fixed(f.mae, 4) + ", " + percent_text(f.leakage) +
           " of the light leaks";
   if (f.contrast > 0.0) text += ", contrast " + contrast_text(f.contrast);
-  text += "\n  blank     relief " + fixed(f.relief, 1) + " mm on " + number_text(design.thickness) +
-          " mm: ";
-  text += f.sheet > 0.0
-              ? "a sheet of " + number_text(f.sheet) + " mm"
-              : std::string("thicker than every sheet on sale; a farther wall needs less");
+  const Printer& printer = settings.wish.cut.workshop.printer;
+  text += f.print ? steps_text(proposal, printer) + print_text(proposal, printer)
+                  : blank_text(proposal);
   text += "\n  machine   " + duration_text(f.minutes());
   std::string parts;
   for (const OperationMinutes& one : f.operations) {
@@ -175,7 +233,20 @@ std::string text_of(const Proposal& proposal, const PlanSettings& settings) {
   text +=
       " (" + parts + "); the design takes about " + duration_text(f.design_seconds / 60.0) + "\n";
   const Commands commands = commands_of(proposal, settings);
-  return text + "    " + commands.design + "\n    " + commands.cam + "\n";
+  return text + "    " + commands.design + "\n    " + commands.make + "\n";
+}
+
+/// A print is of resin unless another material is stated, and needs no sheet.
+void settle_print(const OptionSet& options, PlanSettings& settings) {
+  if (options.given("--sheets")) {
+    throw InputError("--sheets " + printable_line(settings.sheets) +
+                     ": a print needs no sheet; leave it out, or use --part lens");
+  }
+  DesignOptions& design = settings.wish.design;
+  if (!options.given("--material") && !options.given("--ior")) {
+    design.material = "resin";
+    set_material(design.material, design.light, design.ior, design.light.spectrum.abbe);
+  }
 }
 
 CommandResult run(CommandFrame& frame, PlanSettings& settings) {
@@ -185,6 +256,7 @@ CommandResult run(CommandFrame& frame, PlanSettings& settings) {
   wish.sized = options.given("--width");
   wish.pixelled = options.given("--pixels");
   if (options.given("--sheets")) wish.sheets = sheets_of(settings.sheets);
+  if (wish.printed()) settle_print(options, settings);
   if (settings.made_by != "default") wish.cut.workshop = read_workshop(settings.made_by);
   const LoadedImage picture =
       read_image(settings.target, frame.control(), kDrawnSide, settings.background);

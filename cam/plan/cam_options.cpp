@@ -485,13 +485,21 @@ void describe_limits(Description& d, CamOptions& o) {
 
 MadeBy made_by(const CamOptions& options, bool robust) {
   const Workshop& shop = options.workshop;
+  const double spread = robust ? shop.tolerances.polish_sigma : 0.0;
+  if (options.part == PartKind::kPrint) {
+    const Printer& printer = shop.printer;
+    return {.pitch = printer.cell().y(),
+            .polish_sigma = printer.film_sigma,
+            .polish_spread = spread,
+            .polish_order = printer.film_order};
+  }
   const FinishProcess& finish = shop.process.finish;
   const MadeBy made{max_pitch(finish, shop.tool(finish.tool).radius(), kUnknownSlope),
                     finish.along == PassAxis::kX,
                     shop.polish.sigma,
                     shop.polish.rim_depth,
                     shop.polish.rim_length,
-                    robust ? shop.tolerances.polish_sigma : 0.0,
+                    spread,
                     shop.polish.order,
                     shop.polish.floor,
                     shop.polish.roughness,

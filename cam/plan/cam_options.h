@@ -29,10 +29,11 @@ enum class ZZero {
   kLens,   ///< Highest point of the finished surface.
 };
 
-/// The milled part.
+/// The part that is made.
 enum class PartKind {
   kLens,
   kMould,  ///< The negative, from which lenses are cast.
+  kPrint,  ///< The lens, printed and levelled by a film; it is not cut.
 };
 
 /// Parts to be cut out of their blank, last of all.
@@ -127,8 +128,9 @@ std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup
 void validate(const CamOptions& options, const OpticalSetup& setup);
 
 /// The process that a design shapes a part for: the finishing ball's passes and the polish, of a
-/// mould those of its cast. The slopes that a scallop's pitch depends on are not known before the
-/// design. @param robust  two parts, polished less and more by Tolerances::polish_sigma.
+/// mould those of its cast, of a print its pixels and the film. The slopes that a scallop's pitch
+/// depends on are not known before the design. @param robust  two parts, polished less and more by
+/// Tolerances::polish_sigma.
 MadeBy made_by(const CamOptions& options, bool robust);
 
 /// Names in plain words: "top of the blank".

@@ -117,13 +117,16 @@ LeakMap leak_map(const LeakageChain& chain, const Prediction& prediction,
 
 }  // namespace
 
+double smoothing_blur(const OpticalSetup& setup, double sigma) {
+  const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();
+  return kGaussianWidth * sigma * enlarged / pixel_width(setup);
+}
+
 std::vector<PictureBlur> part_blurs(const OpticalSetup& setup, const CamOptions& options,
                                     const Passes& passes, double height, double wavelength) {
   std::vector<PictureBlur> blurs = light_blurs(setup, height, wavelength);
-  const Eigen::Vector2d pixel = setup.image_size.cwiseQuotient(setup.pixels.cast<double>());
-  const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();
   const PolishModel& polish = options.workshop.polish;
-  blurs.push_back({"polish", kGaussianWidth * polish.sigma * enlarged / pixel.minCoeff()});
+  blurs.push_back({"polish", smoothing_blur(setup, polish.sigma)});
   // The ripple reaches twice as far as its steepest slope moves a ray. Of a parabola's p²/(8 R) its
   // amplitude is p²/(2π² R).
   constexpr double kPi = std::numbers::pi;
@@ -132,7 +135,7 @@ std::vector<PictureBlur> part_blurs(const OpticalSetup& setup, const CamOptions&
                            (2.0 * kPi * kPi * finishing_ball(options).radius()) *
                            transfer_of(polish).at(k);
   const double moved = LightPath(setup).reach(2.0 * k * amplitude, height);
-  blurs.push_back({"pitch", moved / pixel.minCoeff()});
+  blurs.push_back({"pitch", moved / pixel_width(setup)});
   return blurs;
 }
 

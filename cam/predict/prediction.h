@@ -120,6 +120,9 @@ class TrialCut {
 void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
                   const RunControl& control);
 
+/// Blur by a film or polish of σ, mm, in pixels: it moves the picture's detail like the lens's.
+double smoothing_blur(const OpticalSetup& setup, double sigma);
+
 /// Blurs of the light, of the polish, which moves the picture's detail like the lens's, and of the
 /// ripple that polish leaves of the rows, by rays.
 /// @param height  of the surface, about, mm. @param wavelength  mm

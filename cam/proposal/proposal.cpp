@@ -35,6 +35,9 @@ constexpr int kFewPixels = 16;
 /// detail per pixel, by which a blur of one pixel changes them.
 constexpr double kRimPower = -0.2;
 constexpr double kDetailPower = 0.55;
+/// The same of what a print's steps add, fitted to three pictures at 96²: level places are a smaller
+/// share of a larger lens.
+constexpr double kStepsPower = -0.5;
 /// Passes and their rounding, which the trial leaves out, add this to the MAE of the polish.
 constexpr double kPasses = 1.05;
 
@@ -83,21 +86,28 @@ double total(const std::vector<OperationMinutes>& operations) {
 
 constexpr double kMinutesPerHour = 60.0;
 
-/// The widest lens, in whole mm, that the hours and the machine's travel allow.
+/// True if the hours and the machine's travel, or the printer's bed, allow a lens of this size.
+bool fits_machine(const ProposalWish& wish, const Eigen::Vector2d& size) {
+  const double relief = kUsualRelief * size.x();
+  const double most = kMinutesPerHour * wish.hours;
+  const Workshop& shop = wish.cut.workshop;
+  if (wish.printed()) {
+    const PrintRun run = print_run(shop.printer, size, wish.design.thickness + relief);
+    return fits_bed(shop.printer, run.box) && run.minutes <= most;
+  }
+  const double beside = 2.0 * (shop.stock.margin + kBeside);
+  return size.x() + beside <= shop.machine.travel.x() &&
+         size.y() + beside <= shop.machine.travel.y() &&
+         total(operation_times(wish.cut, size, relief, 0.5 * relief)) <= most;
+}
+
+/// The widest lens, in whole mm, that hours and machine allow.
 double width_within(const ProposalWish& wish, const Eigen::Vector2i& picture) {
-  const Eigen::Vector3d& travel = wish.cut.workshop.machine.travel;
-  const double beside = 2.0 * (wish.cut.workshop.stock.margin + kBeside);
-  const auto fits = [&](double width) {
-    const Eigen::Vector2d size(width, width * picture.y() / picture.x());
-    const double relief = kUsualRelief * width;
-    return size.x() + beside <= travel.x() && size.y() + beside <= travel.y() &&
-           total(operation_times(wish.cut, size, relief, 0.5 * relief)) <=
-               kMinutesPerHour * wish.hours;
-  };
   const double image = wish.design.light.image_width;
   double width = std::floor(image > 0.0 ? std::min(kUsualWidth, image) : kUsualWidth);
   width = std::max(kMinWidth, width);
-  while (width > kMinWidth && !fits(width)) width -= 1.0;
+  const auto fits = [&] { return fits_machine(wish, {width, width * picture.y() / picture.x()}); };
+  while (width > kMinWidth && !fits()) width -= 1.0;
   return width;
 }
 
@@ -186,38 +196,99 @@ FluxPicture flux_of(const Image& image, double whole) {
 /// A small design and the picture of the part that the wish's process makes of it.
 struct Trial {
   Lens lens;
-  PictureQuality quality;
+  PictureQuality part;   ///< Of a print with its film, without steps.
+  PictureQuality steps;  ///< Of a print: with its steps less without them.
 };
+
+PictureQuality difference(PictureQuality more, const PictureQuality& less) {
+  more.metrics.mae -= less.metrics.mae;
+  more.leakage -= less.leakage;
+  more.dark_ratio -= less.dark_ratio;
+  return more;
+}
 
 /// @throw Interrupted
 Trial tried(const Image& picture, const ProposalWish& wish, const DesignOptions& small, bool waves,
             const Executor& executor, const RunControl& control) {
   DesignResult result = design_lens(picture, small, executor, control);
   if (result.status == DesignResult::Status::kInterrupted) throw Interrupted();
-  const Lens& lens = result.lens;
-  const MadeBy process = made_by(wish.cut, false);
-  Image designed = lens.render;
-  Image part;
-  if (waves) {
-    const WaveOptions options = wave_options(small, lens.setup);
-    designed = wall_of(lens, std::nullopt, options, executor, control).picture;
-    part = wall_of(lens, process, options, executor, control).picture;
-  } else {
-    part = made_part(lens, process, executor).picture;
-  }
+  Lens& lens = result.lens;
+  const auto wall = [&](const std::optional<MadeBy>& process) {
+    return wall_of(lens, process, wave_options(small, lens.setup), executor, control).picture;
+  };
   const double whole = lens.target.total();
-  const FluxPicture reference = flux_of(designed, whole);
+  Image meant = lens.render;
+  if (wish.printed()) {
+    meant = lens.target;
+  } else if (waves) {
+    meant = wall(std::nullopt);
+  }
+  const FluxPicture reference = flux_of(meant, whole);
   const PictureJudge judge(lens.target, reference, wish.cut.leakage);
-  const PictureQuality quality = judge.judge(flux_of(part, whole));
-  return {std::move(result.lens), quality};
+  const MadeBy process = made_by(wish.cut, false);
+  const Image part = waves ? wall(process) : made_part(lens, process, executor).picture;
+  Trial trial;
+  trial.part = judge.judge(flux_of(part, whole));
+  if (wish.printed()) {
+    const Printer& printer = wish.cut.workshop.printer;
+    const FluxPicture stepped = printed_picture(lens, printer, executor, control);
+    trial.steps = difference(judge.judge(stepped), trial.part);
+  }
+  trial.lens = std::move(lens);
+  return trial;
 }
 
-/// Factor from a trial's errors to those of the design's pixels.
-double error_scale(const Image& picture, int pixels, int trial_pixels) {
+/// How a trial's errors become those of more pixels of the same size.
+struct ErrorScale {
+  double part = 1.0;
+  double steps = 1.0;
+};
+
+ErrorScale error_scale(const Image& picture, int pixels, int trial_pixels) {
   const double detail = detail_at(picture, trial_pixels);
   const double share = detail > 0.0 ? detail_at(picture, pixels) / detail : 1.0;
-  return std::pow(static_cast<double>(pixels) / trial_pixels, kRimPower) *
-         std::pow(share, kDetailPower);
+  const double larger = static_cast<double>(pixels) / trial_pixels;
+  return {std::pow(larger, kRimPower) * std::pow(share, kDetailPower),
+          std::pow(larger, kStepsPower)};
+}
+
+/// @throw InputError unless the printer's bed holds a lens of the wish's width and a height, mm.
+void require_bed(const ProposalWish& wish, const Eigen::Vector2d& size, double height) {
+  const Printer& printer = wish.cut.workshop.printer;
+  const Eigen::Vector3d box = print_run(printer, size, height).box;
+  if (fits_bed(printer, box)) return;
+  double width = std::floor(size.x());
+  while (width > 0.0 &&
+         !fits_bed(printer, print_run(printer, width / size.x() * size, height).box)) {
+    width -= 1.0;
+  }
+  const auto box_text = [](const Eigen::Vector3d& sides) {
+    return joined({number_text(sides.x()), " x ", number_text(sides.y()), " x ",
+                   number_text(sides.z()), " mm"});
+  };
+  throw InputError(joined({"--width ", number_text(size.x()), ": the print, ", box_text(box),
+                           ", does not fit on the printer's bed, ", box_text(printer.bed),
+                           width > 0.0 ? "; --width " + number_text(width) + " works"
+                                       : std::string(": no lens of this height does")}));
+}
+
+/// What the process makes of a lens: a sheet and operations, or a print.
+/// @param mean  height of the surface above its lowest point, mm. @param steeper  factor from the
+///              trial's slopes.
+void add_making(const ProposalWish& wish, const Eigen::Vector2d& size, const Trial& trial,
+                double mean, double steeper, const Executor& executor, ProposalForecast& result) {
+  const Workshop& shop = wish.cut.workshop;
+  const double height = wish.design.thickness + result.relief;
+  if (!wish.printed()) {
+    result.operations = operation_times(wish.cut, size, result.relief, mean);
+    result.sheet = thinnest_sheet(wish.sheets, height + shop.stock.allowance);
+    return;
+  }
+  require_bed(wish, size, height);
+  PrintForecast& print = result.print.emplace();
+  print.run = print_run(shop.printer, size, height);
+  print.terraces = terraces_of(trial.lens, shop.printer, steeper, executor);
+  result.operations = {{"print", print.run.minutes}};
 }
 
 /// Forecast by a small design and the model of its process.
@@ -226,29 +297,33 @@ ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const 
   const DesignOptions& design = wish.design;
   const Eigen::Vector2i size(picture.columns(), picture.rows());
   const Eigen::Vector2i all = pixels_of(size, design.pixels);
+  if (wish.printed()) require_bed(wish, size_of(design, size), design.thickness);
   ProposalForecast result;
   result.blurs = blurs_of(wish, optical_setup(design, all));
   result.sharp_pixels = sharp_pixels(wish, size);
-  result.waves = waves_show(result.blurs);
+  // A film blurs more than diffraction, and rays show its steps as waves do (docs/accuracy.md).
+  result.waves = !wish.printed() && waves_show(result.blurs);
   result.design_seconds = estimate_design(all.x(), all.y(), design, executor.concurrency()).seconds;
 
   const int pixels = std::min(kTrialPixels, design.pixels);
   const Trial trial =
       tried(picture, wish, trial_of(design, pixels, size), result.waves, executor, control);
-  const double scale = error_scale(picture, design.pixels, pixels);
-  result.mae = kPasses * scale * trial.quality.metrics.mae + limit_of(picture, design, executor);
-  result.leakage = scale * trial.quality.leakage;
-  const double contrast = trial.quality.contrast();
+  const ErrorScale scale = error_scale(picture, design.pixels, pixels);
+  const double steps = scale.steps * trial.steps.metrics.mae;
+  result.mae = (wish.printed() ? 1.0 : kPasses) * scale.part * trial.part.metrics.mae + steps +
+               limit_of(picture, design, executor);
+  result.leakage = scale.part * trial.part.leakage + scale.steps * trial.steps.leakage;
+  const double contrast = contrast_of(trial.part.dark_ratio + trial.steps.dark_ratio);
   result.contrast = std::isfinite(contrast) ? contrast : 0.0;
 
   // Slopes and widths of the trial are smaller by the same factor.
-  const double higher = std::pow(static_cast<double>(design.pixels) / pixels, 2);
+  const double steeper = static_cast<double>(design.pixels) / pixels;
+  const double higher = std::pow(steeper, 2);
   const Eigen::VectorXd heights = trial.lens.surface.vertices.row(2);
   result.relief = higher * (heights.maxCoeff() - heights.minCoeff());
   const double mean = higher * (heights.mean() - heights.minCoeff());
-  result.operations = operation_times(wish.cut, size_of(design, size), result.relief, mean);
-  result.sheet = thinnest_sheet(
-      wish.sheets, design.thickness + result.relief + wish.cut.workshop.stock.allowance);
+  add_making(wish, size_of(design, size), trial, mean, steeper, executor, result);
+  if (result.print) result.print->steps_mae = steps;
   return result;
 }
 
@@ -307,9 +382,11 @@ Proposal proposal_of(const Image& picture, const Variant& variant, const Executo
 double ProposalForecast::minutes() const { return total(operations); }
 
 std::vector<PictureBlur> blurs_of(const ProposalWish& wish, const OpticalSetup& setup) {
-  const Passes passes = passes_on_lens(wish.cut, unknown_ground(wish.cut, setup));
   const double wavelength = middle_wavelength(setup, kMmPerNm * wish.design.light.wavelength_nm);
-  return part_blurs(setup, wish.cut, passes, wish.design.thickness, wavelength);
+  const double height = wish.design.thickness;
+  if (wish.printed()) return print_blurs(setup, wish.cut.workshop.printer, height, wavelength);
+  const Passes passes = passes_on_lens(wish.cut, unknown_ground(wish.cut, setup));
+  return part_blurs(setup, wish.cut, passes, height, wavelength);
 }
 
 int sharp_pixels(const ProposalWish& wish, const Eigen::Vector2i& picture) {
@@ -318,9 +395,10 @@ int sharp_pixels(const ProposalWish& wish, const Eigen::Vector2i& picture) {
   const Eigen::Vector2i pixels = pixels_of(picture, kTrialPixels);
   const std::vector<PictureBlur> blurs = blurs_of(wish, optical_setup(design, pixels));
   double widest_blur = 0.0;
-  // Ripples of the rows are not of the picture: they do not limit its pixels.
+  // Ripples of rows and steps are not of the picture: they do not limit its pixels.
   for (const PictureBlur& blur : blurs) {
-    if (blur.cause != "pitch") widest_blur = std::max(widest_blur, blur.pixels);
+    if (blur.cause != "pitch" && blur.cause != "steps")
+      widest_blur = std::max(widest_blur, blur.pixels);
   }
   if (widest_blur == 0.0) return kMaxPixels;
   return static_cast<int>(std::min(1e6, pixels.maxCoeff() / widest_blur));
@@ -356,9 +434,11 @@ std::vector<OperationMinutes> operation_times(const CamOptions& options,
   return operations;
 }
 
-std::vector<Proposal> propose(const Image& picture, const ProposalWish& wish,
+std::vector<Proposal> propose(const Image& picture, const ProposalWish& known,
                               const Executor& executor, const RunControl& control) {
   const Eigen::Vector2i size(picture.columns(), picture.rows());
+  ProposalWish wish = known;
+  if (wish.printed()) wish.design.made_by = made_by(wish.cut, false);
   DesignOptions stated = wish.design;
   if (!wish.pixelled) stated.pixels = std::min(stated.pixels, size.maxCoeff());
   validate(stated, picture);
@@ -366,14 +446,16 @@ std::vector<Proposal> propose(const Image& picture, const ProposalWish& wish,
   std::vector<Proposal> proposals{proposal_of(picture, asked, executor, control)};
   std::vector<Variant> others{sharper(asked.wish, size)};
   const DesignOptions& design = asked.wish.design;
-  if (proposals.front().forecast.minutes() > kMinutesPerHour && 0.5 * design.width >= kMinWidth) {
+  // A print's time is that of its layers, whatever its width.
+  if (!wish.printed() && proposals.front().forecast.minutes() > kMinutesPerHour &&
+      0.5 * design.width >= kMinWidth) {
     others.push_back(quicker(asked.wish, size));
   }
   for (const Variant& other : others) {
     try {
       Proposal proposal = proposal_of(picture, other, executor, control);
-      // Without a sheet nobody makes it.
-      if (proposal.forecast.sheet > 0.0) proposals.push_back(std::move(proposal));
+      // Without a sheet nobody mills it.
+      if (wish.printed() || proposal.forecast.sheet > 0.0) proposals.push_back(std::move(proposal));
     } catch (const InputError&) {
       // No surface does it in this light: it is no proposal.
     }

@@ -144,6 +144,11 @@ void check_keep_outs(const Rules& rules, const Workshop& workshop) {
   }
 }
 
+void check_order(const Rules& rules, const char* key, int order) {
+  rules.hold(order == kPadOrder || order == kFilmOrder, key, order,
+             "must be 2 (pads and wheels) or 4 (a levelling film)");
+}
+
 Tool rough_tool() {
   Tool tool;
   tool.number = 3;
@@ -232,9 +237,8 @@ void validate(const Workshop& workshop, const std::string& file) {
   for (std::size_t i = 0; i < workshop.tools.size(); ++i) check_tool(rules, workshop, i);
   check_keep_outs(rules, workshop);
   check_process(rules, workshop);
-  const int order = workshop.polish.order;
-  rules.hold(order == kPadOrder || order == kFilmOrder, "polish.order", order,
-             "must be 2 (pads and wheels) or 4 (a levelling film)");
+  check_order(rules, "polish.order", workshop.polish.order);
+  check_order(rules, "printer.film_order", workshop.printer.film_order);
 }
 
 }  // namespace lensforge

@@ -244,13 +244,35 @@ struct Material {
   friend bool operator==(const Material&, const Material&) = default;
 };
 
+/// A resin printer (DLP, LCD), and the film that levels the steps which it leaves. The defaults are
+/// those of a usual one with a screen of 3840 × 2400 pixels; the film's are assumed.
+struct Printer {
+  std::string name = "resin printer with an LCD of 3840 x 2400 pixels";
+  double pixel = 0.035;                     ///< Side of a pixel on the bed, mm, > 0.
+  double layer = 0.025;                     ///< Thickness of a layer, mm, > 0.
+  Eigen::Vector3d bed{130.0, 80.0, 160.0};  ///< Largest part, mm; z is across the layers.
+  /// The lens stands on its lower edge, y across the layers; else its entry face lies on the bed.
+  bool upright = false;
+  double seconds_per_layer = 8.0;  ///< Exposure, lift and settling, > 0.
+  double start_minutes = 5.0;      ///< Of the first layers, ≥ 0.
+  double film_sigma = 0.3;         ///< PolishTransfer::sigma of the levelling film, mm, > 0.
+  int film_order = 4;              ///< PolishTransfer::order of it.
+
+  /// Unit of the printed lens's heights, mm.
+  [[nodiscard]] double step() const { return upright ? pixel : layer; }
+  /// Rectangle of the lens that has one height, mm.
+  [[nodiscard]] Eigen::Vector2d cell() const { return {pixel, upright ? layer : pixel}; }
+
+  friend bool operator==(const Printer&, const Printer&) = default;
+};
+
 /// The default tools: 3, a 3 mm flat end mill for roughing; 2, a 1 mm ball for semi-finishing; 1,
 /// the 0.4 mm ball of the paper (Sun et al., Section 5) for finishing; 4, a 6 mm ball for
 /// FinishProcess::large_tool, with a feed of 0.04 mm per tooth.
 std::vector<Tool> default_tools();
 
-/// A whole workshop: machine, blank, clamps, tools and their use; everything about a cut except the
-/// lens.
+/// A whole workshop: machine, blank, clamps, tools and their use, or its printer; everything about
+/// a part except the lens.
 struct Workshop {
   Machine machine;
   Material material;
@@ -260,6 +282,7 @@ struct Workshop {
   Process process;
   PolishModel polish{0.03, 0.0, 1.0};  ///< Polish after the last cut.
   Tolerances tolerances;               ///< Errors of all these.
+  Printer printer;                     ///< For parts that are printed instead.
 
   /// Null if no tool has this number.
   [[nodiscard]] const Tool* find_tool(int number) const;
@@ -287,6 +310,7 @@ void describe(Description& d, Process& process);  ///< But for roughing, semi an
 void describe(Description& d, PolishModel& polish);
 void describe(Description& d, WavinessBand& band);
 void describe(Description& d, Tolerances& t);
+void describe(Description& d, Printer& printer);
 void describe(Description& d, Workshop& shop);
 
 /// The range of one of the workshop's numbers, by its key in the file: "process.safe_height",

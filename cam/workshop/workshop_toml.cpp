@@ -41,6 +41,13 @@ constexpr double kMaxFloor = 0.99;
 constexpr double kMaxRoughness = 1000.0;
 constexpr double kMaxCorrelation = 1000.0;
 
+/// mm; of pixels and layers: below the finest that are sold, and above the coarsest.
+constexpr double kFinestPrint = 1e-3;
+constexpr double kCoarsestPrint = 1.0;
+/// mm; of a film's σ: with less no step is levelled, with more no picture is left.
+constexpr double kLeastFilm = 0.01;
+constexpr double kMostFilm = 5.0;
+
 /// mm; shorter waves are finer than the rows.
 constexpr double kShortestWave = 0.2;
 /// µm; beyond it errors are no longer small against the ball.
@@ -248,6 +255,23 @@ void describe(Description& d, Tolerances& t) {
          "Waves that the machine's axes leave in the surface; rms_um = 0 for none.");
 }
 
+void describe(Description& d, Printer& printer) {
+  d.text("name", printer.name, "", "");
+  d.length("pixel", printer.pixel, {kFinestPrint, kCoarsestPrint},
+           "mm, side of a pixel on the bed");
+  d.length("layer", printer.layer, {kFinestPrint, kCoarsestPrint}, "mm, thickness of a layer");
+  describe_axes(d, "bed", printer.bed, {1.0, kLength}, "mm", "mm, the largest part");
+  d.flag("upright", printer.upright,
+         "the lens stands on its lower edge; else its entry face lies on the bed");
+  d.number("seconds_per_layer", printer.seconds_per_layer, {0.01, 3600.0}, "s",
+           "s, exposure, lift and settling");
+  d.number("start_minutes", printer.start_minutes, {0.0, 600.0}, "min", "min, of the first layers");
+  d.length("film_sigma", printer.film_sigma, {kLeastFilm, kMostFilm},
+           "mm, of the film that levels the steps, as polish.sigma; assumed");
+  d.whole("film_order", printer.film_order, {kPadOrder, kFilmOrder},
+          "as polish.order: 4 for resin that levels under its tension");
+}
+
 void describe(Description& d, Workshop& shop) {
   d.table("machine", shop.machine, "The mill. Sizes are millimetres.");
   d.table("material", shop.material, "What the blank is made of.");
@@ -270,6 +294,8 @@ void describe(Description& d, Workshop& shop) {
       "tolerances", shop.tolerances,
       "How far all this may be off, for cam --tolerances. \"sigma\" is a standard deviation, other "
       "bounds are uniform.");
+  d.table("printer", shop.printer,
+          "A resin printer in place of the mill, for --part print; an example of what is sold.");
 }
 
 Limits workshop_limits(std::string_view key) { return description_of(Workshop()).at(key).limits; }

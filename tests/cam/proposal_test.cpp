@@ -97,6 +97,55 @@ TEST(Proposal, ATrialIsLitAsTheLensIs) {
   EXPECT_DOUBLE_EQ(propose(picture, wish, executor, {}).front().forecast.relief, expected);
 }
 
+ProposalWish print_wish(int pixels) {
+  ProposalWish wish;
+  wish.cut.part = PartKind::kPrint;
+  wish.sized = wish.pixelled = true;
+  wish.design.width = 30.0;
+  wish.design.focal_length = 90.0;
+  wish.design.pixels = pixels;
+  return wish;
+}
+
+TEST(Proposal, AFilmLimitsAPrint) {
+  ProposalWish wish = print_wish(16);
+  wish.design.width = 100.0;
+  // 2.35 × 0.3 mm of 100; what steps spread is no limit.
+  EXPECT_NEAR(sharp_pixels(wish, {256, 256}), 141, 1);
+}
+
+TEST(Proposal, ThinnerLayersShowMoreOfAPicture) {
+  ProposalWish wish = print_wish(24);
+  const Image picture = disc(24);
+  const auto first = [&](double layer) {
+    wish.cut.workshop.printer.layer = layer;
+    return propose(picture, wish, Executor::cpu(), {}).front().forecast;
+  };
+  const ProposalForecast coarse = first(0.05);
+  const ProposalForecast fine = first(0.01);
+  ASSERT_TRUE(coarse.print && fine.print);
+  EXPECT_FALSE(coarse.waves);
+  EXPECT_GT(coarse.print->steps_mae, 2.0 * fine.print->steps_mae);
+  // What the film alone leaves is the same.
+  EXPECT_NEAR(coarse.mae - coarse.print->steps_mae, fine.mae - fine.print->steps_mae, 1e-12);
+  EXPECT_GT(coarse.print->terraces.share, fine.print->terraces.share);
+  EXPECT_NEAR(static_cast<double>(fine.print->run.layers),
+              5.0 * static_cast<double>(coarse.print->run.layers), 5.0);
+  EXPECT_DOUBLE_EQ(coarse.minutes(), coarse.print->run.minutes);
+}
+
+TEST(Proposal, APrintKeepsToTheBedAndTheHours) {
+  ProposalWish wish = print_wish(16);
+  wish.cut.workshop.printer.bed = {20.0, 25.0, 100.0};
+  EXPECT_THROW((void)propose(disc(32), wish, Executor::cpu(), {}), InputError);
+  wish.sized = false;
+  wish.design.focal_length = 300.0;
+  EXPECT_EQ(propose(disc(32), wish, Executor::cpu(), {}).front().design.width, 20.0);
+  wish.hours = 0.6;
+  const Proposal quick = propose(disc(32), wish, Executor::cpu(), {}).front();
+  EXPECT_LT(quick.design.width, 20.0);
+}
+
 TEST(Proposal, ContradictionsAreRefused) {
   ProposalWish wish = wish_for("led:3mm@600mm");
   wish.design.light.source_position = Eigen::Vector3d(0.0, 0.0, -100.0);
