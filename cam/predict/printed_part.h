@@ -12,9 +12,8 @@
 namespace lensforge {
 
 /// Picture that a lens projects when it is printed in steps (PrintedField) and levelled by a film
-/// (PolishedField), by rays. Beyond the lens's rim the print goes on (continued_surface()). By
-/// waves it is the same as long as the film blurs more than diffraction does (docs/accuracy.md,
-/// "Plans"). @throw Interrupted
+/// (PolishedField), by rays. Beyond the lens's rim the print goes on (continued_surface()).
+/// @throw Interrupted
 FluxPicture printed_picture(const Lens& lens, const Printer& printer, const Executor& executor,
                             const RunControl& control);
 

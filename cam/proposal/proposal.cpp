@@ -35,7 +35,7 @@ constexpr int kFewPixels = 16;
 /// detail per pixel, by which a blur of one pixel changes them.
 constexpr double kRimPower = -0.2;
 constexpr double kDetailPower = 0.55;
-/// The same of what a print's steps add, fitted to three pictures at 96²: level places are a smaller
+/// The same of what a print's steps add, by the pictures at 96² there: level places are a smaller
 /// share of a larger lens.
 constexpr double kStepsPower = -0.5;
 /// Passes and their rounding, which the trial leaves out, add this to the MAE of the polish.
@@ -301,7 +301,7 @@ ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const 
   ProposalForecast result;
   result.blurs = blurs_of(wish, optical_setup(design, all));
   result.sharp_pixels = sharp_pixels(wish, size);
-  // A film blurs more than diffraction, and rays show its steps as waves do (docs/accuracy.md).
+  // A film blurs more than diffraction does, and waves of steps so steep take minutes.
   result.waves = !wish.printed() && waves_show(result.blurs);
   result.design_seconds = estimate_design(all.x(), all.y(), design, executor.concurrency()).seconds;
 
@@ -397,8 +397,8 @@ int sharp_pixels(const ProposalWish& wish, const Eigen::Vector2i& picture) {
   double widest_blur = 0.0;
   // Ripples of rows and steps are not of the picture: they do not limit its pixels.
   for (const PictureBlur& blur : blurs) {
-    if (blur.cause != "pitch" && blur.cause != "steps")
-      widest_blur = std::max(widest_blur, blur.pixels);
+    if (blur.cause == "pitch" || blur.cause == "steps") continue;
+    widest_blur = std::max(widest_blur, blur.pixels);
   }
   if (widest_blur == 0.0) return kMaxPixels;
   return static_cast<int>(std::min(1e6, pixels.maxCoeff() / widest_blur));

@@ -55,8 +55,8 @@ struct ProposalForecast {
   double leakage = 0.0;
   double contrast = 0.0;  ///< PictureQuality::contrast() of the part; 0 for a picture without dark.
   double relief = 0.0;    ///< Highest − lowest point of the surface, mm.
-  double sheet =
-      0.0;  ///< Thinnest of ProposalWish::sheets that fits; 0 if none does, or of a print.
+  /// Thinnest of ProposalWish::sheets that fits; 0 if none does, or for a print.
+  double sheet = 0.0;
   std::optional<PrintForecast> print;
   std::vector<OperationMinutes> operations;
   double design_seconds = 0.0;  ///< estimate_design()
