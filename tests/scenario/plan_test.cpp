@@ -123,7 +123,7 @@ TEST_F(Plan, APrintIsMadeOnTheWorkshopsPrinter) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   for (const std::string& part :
        {std::string("does not show the picture: terraces"), std::string("pixels of "),
-        std::string("40 layers of 0.5 mm"), std::string("0:40 h"), std::string("--material pc"),
+        std::string("40 layers of 0.5 mm"), std::string("40 min"), std::string("--material pc"),
         "--made-by " + path("shop.toml") + " --part print"}) {
     EXPECT_THAT(outcome.out, HasSubstr(part));
   }
