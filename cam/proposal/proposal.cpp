@@ -35,7 +35,7 @@ constexpr int kFewPixels = 16;
 /// detail per pixel, by which a blur of one pixel changes them.
 constexpr double kRimPower = -0.2;
 constexpr double kDetailPower = 0.55;
-/// The same of what a print's steps add, by the pictures at 96² there: level places are a smaller
+/// The same of what a print's steps add, by two pictures at 96² there: level places are a smaller
 /// share of a larger lens.
 constexpr double kStepsPower = -0.5;
 /// Passes and their rounding, which the trial leaves out, add this to the MAE of the polish.
