@@ -167,6 +167,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
       throw InputError("--made-by " + settings.made_by + ": needs --model spline, not " +
                        model_name(settings.design.model));
     }
+    validate_shrinkage(settings.cut);
     settings.design.model = SurfaceModel::kSpline;
     if (settings.made_by != "default") {
       settings.cut.workshop = read_workshop(settings.made_by);

@@ -230,9 +230,16 @@ std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup
   return "";
 }
 
+void validate_shrinkage(const CamOptions& options) {
+  if (options.shrinkage == 0.0 || options.part == PartKind::kMould) return;
+  refuse("--shrinkage", options.shrinkage,
+         "is of casts from a mould; use --part mould, or leave it out");
+}
+
 void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate(options.workshop, "workshop");
   require_limits(options);
+  validate_shrinkage(options);
   const Tool& ball = options.workshop.tool(options.workshop.process.finish.tool);
   const double smallest = setup.lens_size.minCoeff();
   if (!(ball.diameter < smallest)) {

@@ -133,6 +133,9 @@ void validate(const CamOptions& options, const OpticalSetup& setup);
 /// Tolerances::polish_sigma.
 MadeBy made_by(const CamOptions& options, bool robust);
 
+/// @throw InputError if a shrinkage is stated of anything but casts from a mould.
+void validate_shrinkage(const CamOptions& options);
+
 /// Names in plain words: "top of the blank".
 const char* words_for(ZZero zero);
 const char* words_for(SurfaceModel surface);

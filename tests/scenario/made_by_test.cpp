@@ -142,6 +142,8 @@ TEST_F(MadeBy, WhatCannotBeDesignedForIsRefused) {
                  {"polish.sigma 0.0001", "too fine", "at least 0.0004 mm"});
   expect_refusal(design({"--part", "mould"}), 2, {"--part", "needs --made-by"});
   expect_refusal(design({"--made-by", "default", "--shrinkage", "0.3"}), 2, {"--shrinkage 0.3"});
+  expect_refusal(design({"--made-by", "default", "--shrinkage", "0.1"}), 2,
+                 {"--shrinkage 0.1", "--part mould"});
   EXPECT_FALSE(fs::exists(at("lens")));
 }
 
