@@ -227,6 +227,8 @@ std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup
   }
   if (setup.outline) return "draws parts of rectangular lenses only";
   if (setup.front) return "draws parts with a flat front only";
+  // PartModel polishes heights without scallops.
+  if (options.workshop.polish.sigma == 0.0) return "draws parts that are polished only";
   return "";
 }
 

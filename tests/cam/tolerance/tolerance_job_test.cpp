@@ -75,6 +75,9 @@ TEST(ToleranceJob, WhatHasNoRangeIsCutWithoutOne) {
   CamOptions two = drawn(0);
   two.workshop.process.finish.large_tool = 2;
   EXPECT_EQ(part_draws(two, small_lens().setup).parts, 0);
+  CamOptions raw = drawn(0);
+  raw.workshop.polish.sigma = 0.0;
+  EXPECT_EQ(part_draws(raw, small_lens().setup).parts, 0);
   CamOptions programs = drawn(0);
   programs.render = false;
   EXPECT_EQ(part_draws(programs, small_lens().setup).parts, 0);
