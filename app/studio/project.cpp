@@ -274,7 +274,7 @@ fs::path Project::move_to(const fs::path& bin) {
   require_idle();
   if (sending()) throw InputError("a program is being sent; end the job first");
   fs::create_directories(bin);
-  const fs::path place = free_folder(bin, folder_.filename().string());
+  fs::path place = free_folder(bin, folder_.filename().string());
   fs::rename(folder_, place);
   return place;
 }

@@ -272,22 +272,23 @@ void require_bed(const ProposalWish& wish, const Eigen::Vector2d& size, double h
                                        : std::string(": no lens of this height does")}));
 }
 
-/// What the process makes of a lens: a sheet and operations, or a print.
-/// @param mean  height of the surface above its lowest point, mm. @param steeper  factor from the
-///              trial's slopes.
-void add_making(const ProposalWish& wish, const Eigen::Vector2d& size, const Trial& trial,
-                double mean, double steeper, const Executor& executor, ProposalForecast& result) {
-  const Workshop& shop = wish.cut.workshop;
+/// @param mean  height of the surface above its lowest point, mm.
+void add_cut(const ProposalWish& wish, const Eigen::Vector2d& size, double mean,
+             ProposalForecast& result) {
   const double height = wish.design.thickness + result.relief;
-  if (!wish.printed()) {
-    result.operations = operation_times(wish.cut, size, result.relief, mean);
-    result.sheet = thinnest_sheet(wish.sheets, height + shop.stock.allowance);
-    return;
-  }
+  result.operations = operation_times(wish.cut, size, result.relief, mean);
+  result.sheet = thinnest_sheet(wish.sheets, height + wish.cut.workshop.stock.allowance);
+}
+
+/// @param steeper  factor from the slopes of the trial's lens.
+void add_print(const ProposalWish& wish, const Eigen::Vector2d& size, const Lens& lens,
+               double steeper, const Executor& executor, ProposalForecast& result) {
+  const Printer& printer = wish.cut.workshop.printer;
+  const double height = wish.design.thickness + result.relief;
   require_bed(wish, size, height);
   PrintForecast& print = result.print.emplace();
-  print.run = print_run(shop.printer, size, height);
-  print.terraces = terraces_of(trial.lens, shop.printer, steeper, executor);
+  print.run = print_run(printer, size, height);
+  print.terraces = terraces_of(lens, printer, steeper, executor);
   result.operations = {{"print", print.run.minutes}};
 }
 
@@ -322,8 +323,12 @@ ProposalForecast forecast(const Image& picture, const ProposalWish& wish, const 
   const Eigen::VectorXd heights = trial.lens.surface.vertices.row(2);
   result.relief = higher * (heights.maxCoeff() - heights.minCoeff());
   const double mean = higher * (heights.mean() - heights.minCoeff());
-  add_making(wish, size_of(design, size), trial, mean, steeper, executor, result);
-  if (result.print) result.print->steps_mae = steps;
+  if (wish.printed()) {
+    add_print(wish, size_of(design, size), trial.lens, steeper, executor, result);
+    result.print->steps_mae = steps;
+  } else {
+    add_cut(wish, size_of(design, size), mean, result);
+  }
   return result;
 }
 

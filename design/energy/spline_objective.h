@@ -90,7 +90,7 @@ class SplineFoldsOn {
         shape_(nodes_.shape()),
         cells_(std::int64_t{shape_.columns - 1} * (shape_.rows - 1)),
         lowest_(kLeastShare * 0.5 * size.prod() / static_cast<double>(cells_)),
-        positions_(3 * static_cast<std::size_t>(shape_.columns) * shape_.rows),
+        positions_(3 * static_cast<std::size_t>(std::int64_t{shape_.columns} * shape_.rows)),
         normals_(positions_.size()) {}
 
   [[nodiscard]] bool any(const double* points) {
