@@ -101,13 +101,15 @@ void divide_pixel(const Eigen::Vector2d& corner, int parts, const SourcePoint& w
 std::vector<SourcePoint> join_pixels(const SourceShape& shape, int side, double total) {
   const int across = (shape.columns + side - 1) / side;
   const int down = (shape.rows + side - 1) / side;
-  std::vector<SourcePoint> blocks(static_cast<std::size_t>(across) * down,
-                                  {Eigen::Vector2d::Zero(), 0.0});
+  const int count = across * down;
+  std::vector<SourcePoint> blocks(static_cast<std::size_t>(count), {Eigen::Vector2d::Zero(), 0.0});
   const Eigen::Vector2d middle(0.5 * shape.columns, 0.5 * shape.rows);
   for (int r = 0; r < shape.rows; ++r) {
     for (int c = 0; c < shape.columns; ++c) {
-      const double share = shape.weights[static_cast<std::size_t>(r * shape.columns + c)] / total;
-      SourcePoint& block = blocks[static_cast<std::size_t>(r / side * across + c / side)];
+      const int pixel = r * shape.columns + c;
+      const int joined = r / side * across + c / side;
+      const double share = shape.weights[static_cast<std::size_t>(pixel)] / total;
+      SourcePoint& block = blocks[static_cast<std::size_t>(joined)];
       block.share += share;
       block.at += share * Eigen::Vector2d(c + 0.5 - middle.x(), middle.y() - r - 0.5);
     }
@@ -123,7 +125,8 @@ std::vector<SourcePoint> divide_pixels(const SourceShape& shape, int parts, doub
   std::vector<SourcePoint> points;
   for (int r = 0; r < shape.rows; ++r) {
     for (int c = 0; c < shape.columns; ++c) {
-      const double weight = shape.weights[static_cast<std::size_t>(r * shape.columns + c)];
+      const int pixel = r * shape.columns + c;
+      const double weight = shape.weights[static_cast<std::size_t>(pixel)];
       if (weight > 0.0) divide_pixel({c, r}, parts, {upper_left, weight / total}, points);
     }
   }
@@ -138,7 +141,7 @@ std::vector<SourcePoint> shape_points(const SourceExtent& extent, int count) {
   const double each_way = std::sqrt(static_cast<double>(count) / static_cast<double>(lit));
   std::vector<SourcePoint> points =
       each_way >= 0.5 ? divide_pixels(shape, std::max(1, static_cast<int>(each_way)), total)
-                     : join_pixels(shape, static_cast<int>(std::ceil(1.0 / each_way)), total);
+                      : join_pixels(shape, static_cast<int>(std::ceil(1.0 / each_way)), total);
   for (SourcePoint& point : points) point.at *= extent.width / shape.columns;
   return points;
 }

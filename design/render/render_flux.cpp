@@ -41,7 +41,7 @@ class Strips {
   }
   /// light_on() for all strips.
   [[nodiscard]] LightPath light(const Executor& executor) const {
-    const LightPath light(setup_);
+    LightPath light(setup_);
     if (light.intake_is_plan_area()) return light;
     std::vector<double> intakes(static_cast<std::size_t>(count()));
     parallel_for(
