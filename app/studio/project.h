@@ -53,7 +53,8 @@ class Project {
   void undo() { step_version(-1); }
   void redo() { step_version(1); }
 
-  /// Moves the project's folder into `bin`, which is made if there is none; then this is not usable.
+  /// Moves the project's folder into `bin`, which is made if there is none; then this is not
+  /// usable.
   /// @return where it is. @throw InputError if something of it runs.
   [[nodiscard]] std::filesystem::path move_to(const std::filesystem::path& bin);
 
