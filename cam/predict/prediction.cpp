@@ -613,7 +613,7 @@ ToleranceForecast draw_parts(const CutSetup& setup, const PartDraws& draws,
   return forecast_parts(model, source, judge, draws, executor, control);
 }
 
-/// Parts for the range alone, whose ends are then good to a tenth of it.
+/// Parts for the range alone.
 constexpr int kRangeParts = 12;
 
 }  // namespace

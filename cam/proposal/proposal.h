@@ -7,7 +7,6 @@
 
 #include "cam/plan/cam_options.h"
 #include "cam/predict/printed_part.h"
-#include "cam/printed/print_run.h"
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/optics/optical_setup.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/printed/printed_field.h"
+#include "cam/predict/printed_part.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,6 @@
 #include <numbers>
 
 #include "cam/milled/polished_field.h"
-#include "cam/printed/print_run.h"
 
 namespace lensforge {
 namespace {
