@@ -3,17 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "cam/contact/profile_cutter.h"
 #include "cam/path/operation.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 /// Depth by which a path may sink below surface and ramp, mm: passes are above the floor by at most
 /// its slope times their spacing (PassGrid), which is less on slopes up to 0.9 with the default

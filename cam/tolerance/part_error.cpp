@@ -33,7 +33,6 @@ namespace {
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kMicrometre = 1e-3;
 constexpr double kMilliradian = 1e-3;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 /// Waves per band: enough to make its sum nearly normal.
 constexpr int kWavesPerBand = 6;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 // Small functions of single numbers.
 namespace lensforge {
@@ -15,6 +16,9 @@ struct ValueSlope {
 };
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// rad
+inline constexpr double kDegree = std::numbers::pi / 180.0;
 
 /// A float below a double, so that a box of floats contains the box of doubles.
 inline float float_below(double value) {

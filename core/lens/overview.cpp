@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kPanelSide = 512;       ///< Longer side of one panel, pixels.
 constexpr int kGap = 8;               ///< Between panels, pixels.
-constexpr int kSamples = 2;           ///< Relief samples per pixel side.
+constexpr int kReliefSamples = 2;     ///< Relief samples per pixel side.
 constexpr int kSwellShare = 24;       ///< A swell is wider than this share of the longer side.
 constexpr float kFlattening = 0.85F;  ///< Share of the swells that is taken away.
 constexpr double kStretch = 0.01;     ///< Share of the relief that may clip at either end.
@@ -122,7 +122,7 @@ Image draw_relief(const SurfaceMesh& mesh, const OpticalSetup& setup, int column
   OpticalSetup seen = setup;
   seen.image_origin = Eigen::Vector2d::Zero();
   seen.image_size = setup.lens_size;
-  seen.pixels = {columns * kSamples, rows * kSamples};
+  seen.pixels = {columns * kReliefSamples, rows * kReliefSamples};
   const ImagePlane plane(seen);
   const double toward_left = plane.pixels_per_mm().x() > 0.0 ? -1.0 : 1.0;
   Image image(seen.pixels.x(), seen.pixels.y());

@@ -140,7 +140,7 @@ ordered_json source_json(const OpticalSetup& setup) {
   return source;
 }
 
-SourceShape read_shape(const JsonFields& source) {
+SourceShape read_source_shape(const JsonFields& source) {
   SourceShape shape;
   const nlohmann::json& rows = source.at("shape");
   const auto refuse = [&] {
@@ -167,7 +167,7 @@ void read_source(const JsonFields& source, OpticalSetup& setup) {
   read_typed(source, setup.lamp);
   const LampTraits& lamp = traits(setup.lamp);
   if (source.has(lamp.width_key)) setup.extent.width = source.number(lamp.width_key) * lamp.unit;
-  if (source.has("shape")) setup.extent.shape = read_shape(source);
+  if (source.has("shape")) setup.extent.shape = read_source_shape(source);
 }
 
 ordered_json screen_json(const OpticalSetup& setup) {

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
-#include <numbers>
 #include <sstream>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/image/color.h"
 #include "core/schema/description.h"
@@ -263,8 +263,6 @@ std::vector<std::pair<std::string, Body>> named_bodies() {
 }
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 std::string page_number(double value) { return trimmed_decimal(value, 1); }
 

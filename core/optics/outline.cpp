@@ -178,7 +178,7 @@ namespace {
 
 /// Weights this close to 0 become 0: the corner is then on a side of the triangle and coincides
 /// with the neighbouring triangle's.
-constexpr double kOnSide = 1e-12;
+constexpr double kOnCorner = 1e-12;
 
 double doubled_area(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
   return cross(b - a, c - a);
@@ -267,7 +267,7 @@ Eigen::Vector3d weights_of(const PlanTriangle& t, const Eigen::Vector2d& p) {
   Eigen::Vector3d w(doubled_area(p, t[1], t[2]), doubled_area(p, t[2], t[0]),
                     doubled_area(p, t[0], t[1]));
   w /= doubled_area(t[0], t[1], t[2]);
-  for (double& entry : w) entry = entry < kOnSide ? 0.0 : entry;
+  for (double& entry : w) entry = entry < kOnCorner ? 0.0 : entry;
   return w / w.sum();
 }
 

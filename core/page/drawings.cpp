@@ -7,11 +7,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/optics/front.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
@@ -24,13 +24,12 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kWidth = 760.0;    ///< Width of the drawing; all lengths are in its units.
-constexpr double kMargin = 60.0;    ///< Around a view, for its labels.
-constexpr double kTallest = 300.0;  ///< Maximum height of a view.
-constexpr double kLine = 18.0;      ///< Line height of text.
+constexpr double kWidth = 760.0;      ///< Width of the drawing; all lengths are in its units.
+constexpr double kViewMargin = 60.0;  ///< Around a view, for its labels.
+constexpr double kTallest = 300.0;    ///< Maximum height of a view.
+constexpr double kLine = 18.0;        ///< Line height of text.
 /// Maximum extent of a drawing to scale, in diagonals of the part; beyond it the part is a dot.
 constexpr double kLargestToScale = 20.0;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 constexpr const char* kRay = "stroke=\"#c98a00\" stroke-width=\"1.5\"";
 constexpr const char* kDistance = "stroke=\"#56616b\" stroke-dasharray=\"5 4\"";
@@ -97,13 +96,15 @@ class View {
   }
 
   [[nodiscard]] double largest_scale() const {
-    return std::min((kWidth - 2.0 * kMargin) / box_.sizes().x(), kTallest / box_.sizes().y());
+    return std::min((kWidth - 2.0 * kViewMargin) / box_.sizes().x(), kTallest / box_.sizes().y());
   }
   void set(double scale, double top) {
     scale_ = scale;
-    top_ = top + kMargin;
+    top_ = top + kViewMargin;
   }
-  [[nodiscard]] double bottom() const { return top_ + scale_ * box_.sizes().y() + 0.6 * kMargin; }
+  [[nodiscard]] double bottom() const {
+    return top_ + scale_ * box_.sizes().y() + 0.6 * kViewMargin;
+  }
   [[nodiscard]] int up() const { return up_; }
 
   /// A corner of the picture.
@@ -112,7 +113,7 @@ class View {
   }
   [[nodiscard]] Vector2d at(const Vector3d& p) const {
     const Vector2d f = flat(p) - box_.min();
-    return {kMargin + scale_ * f.x(), top_ + scale_ * (box_.sizes().y() - f.y())};
+    return {kViewMargin + scale_ * f.x(), top_ + scale_ * (box_.sizes().y() - f.y())};
   }
 
  private:

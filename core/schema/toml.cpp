@@ -293,7 +293,7 @@ void read_list(const Field& list, TomlFields& fields) {
   for (TomlFields& item : fields.tables(list.name)) read_toml(list.append(), std::move(item));
 }
 
-std::string quoted(const std::string& value) {
+std::string toml_string(const std::string& value) {
   std::string text = "\"";
   for (const char c : value) {
     if (c == '"' || c == '\\') text += '\\';
@@ -306,7 +306,7 @@ std::string value_text(const FieldValue& value) {
   if (const auto* const flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
   if (const auto* const whole = std::get_if<int>(&value)) return std::to_string(*whole);
   if (const auto* const number = std::get_if<double>(&value)) return shortest_text(*number);
-  return quoted(std::get<std::string>(value));
+  return toml_string(std::get<std::string>(value));
 }
 
 /// @param prefix  path of the table, with a dot behind it.

@@ -217,7 +217,7 @@ static_assert(std::endian::native == std::endian::little, "splines are little-en
 
 constexpr std::string_view kMagic = "lensforge spline 1\n";
 /// Maximum file size: 178 million control points.
-constexpr std::uintmax_t kMaxBytes = std::uintmax_t{4} << 30U;
+constexpr std::uintmax_t kMaxSplineBytes = std::uintmax_t{4} << 30U;
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
   throw InputError(path.string() + ": " + why);
@@ -249,7 +249,7 @@ void write_spline(const ControlNet& net, const std::filesystem::path& path) {
 }
 
 ControlNet read_spline(const std::filesystem::path& path) {
-  const std::string content = read_whole_file(path, kMaxBytes);
+  const std::string content = read_whole_file(path, kMaxSplineBytes);
   std::string_view rest = content;
   if (!rest.starts_with(kMagic)) refuse(path, "is no spline of this version");
   rest.remove_prefix(kMagic.size());

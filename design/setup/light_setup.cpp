@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
@@ -200,8 +199,6 @@ void require_height_map(const OpticalSetup& setup, double thickness, const std::
 }
 
 // Source, surface and screen together.
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 /// Proposed distance of a misplaced source: that of the paper's pictures.
 constexpr double kUsualDistance = 600.0;

@@ -203,8 +203,6 @@ ModalWords::ModalWords(const GcodeBlock& block, const GcodeDialect& dialect) {
   }
 }
 
-constexpr double kMillimetresPerInch = 25.4;
-
 std::string with_number(const std::string& word, double value) {
   return word + shortest_text(value);
 }

@@ -12,6 +12,8 @@
 
 namespace lensforge {
 
+inline constexpr double kMillimetresPerInch = 25.4;
+
 /// Actions of one line, in this order: tool, spindle, dwell, motions, stop.
 class GcodeEffect {
  public:

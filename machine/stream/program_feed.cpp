@@ -9,7 +9,6 @@
 namespace lensforge {
 namespace {
 
-constexpr double kMillimetresPerInch = 25.4;
 /// The most that programs have. A circle's added end must equal its start: rounding would turn it
 /// into a tiny arc.
 constexpr int kDecimals = 8;

@@ -13,8 +13,6 @@
 namespace lensforge {
 namespace {
 
-constexpr double kMillimetresPerInch = 25.4;
-
 /// Distance of the points on a ramp, mm: the parabola differs from its chords by less than 0.4 µm
 /// for a lift of 0.3 mm over 2 mm.
 constexpr double kPointDistance = 0.1;

@@ -14,11 +14,11 @@ namespace {
 /// A link that takes nothing is tried again after this, s.
 constexpr double kWriteAgain = 0.002;
 /// Longest time without a look at the stop token and the keys, s.
-constexpr double kStopCheck = 0.1;
+constexpr double kOperatorCheck = 0.1;
 /// Grbl reports "Idle" between accepting a motion and starting it, hence more than one.
 constexpr int kIdleReports = 2;
 /// A ? that got lost is asked again after this, s.
-constexpr double kAskAgain = 1.0;
+constexpr double kStatusAgain = 1.0;
 /// Tolerance of the controller's own speed report, which is rounded to whole rpm.
 constexpr double kSpeedTolerance = 0.01;
 /// Tolerance of an encoder's reading, share of the requested speed, and its reading at rest.
@@ -199,7 +199,7 @@ Question ask_status(SendState state, const SenderOptions& options, double now) {
                         "the controller has not answered ? for " + std::to_string(silent) + " s")};
   }
   status.due =
-      now + (status.asked_since ? kAskAgain : std::max(options.status_interval, kStatusPause));
+      now + (status.asked_since ? kStatusAgain : std::max(options.status_interval, kStatusPause));
   if (!status.asked_since) {
     status.asked_since = now;
     status.stale = false;
@@ -321,7 +321,7 @@ SendState reported_while_stopping(SendState state, const StatusReport& report,
 
 double wait_time(const SendState& state, bool guarded, bool waiting, double now) {
   if (waiting) return kWriteAgain;
-  double due = std::min(state.status.due, now + kStopCheck);
+  double due = std::min(state.status.due, now + kOperatorCheck);
   if (guarded) due = std::min(due, state.guard.due);
   return std::max(due - now, 0.0);
 }

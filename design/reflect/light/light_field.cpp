@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/text/read_numbers.h"
 #include "core/text/words.h"
@@ -85,8 +86,6 @@ Eigen::Matrix3Xd hemisphere_directions(int count) {
 }
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 /// Rows and columns of the band for energies that are reported.
 constexpr BandSampling kEvaluationBand{12, 64, 0.0};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cam/coupon/coupon_readings.h"
+#include "core/compute/scalar.h"
 
 namespace lensforge {
 namespace {
@@ -78,8 +79,6 @@ TEST(CouponModel, OrdersOfAWaveAreBesselFunctions) {
     EXPECT_NEAR(wave.order_ratio(phase), bessel, 1e-6 * bessel) << delay;
   }
 }
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 CouponState rough(double rms, double correlation) {
   CouponState state;

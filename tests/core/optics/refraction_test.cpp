@@ -9,6 +9,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/compute/scalar.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"
 #include "design/snell.h"
@@ -195,8 +196,6 @@ TEST(InverseRefraction, SurfaceRisesTowardsWhereTheLightGoes) {
   EXPECT_NEAR(gradient.x(), 0.1, 2e-3);
   EXPECT_NEAR(gradient.y(), -0.2, 4e-3);
 }
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 TEST(Fresnel, AcrylicLetsThroughWhatFormulasByAnglesSay) {
   for (double degrees = 1.0; degrees < 42.0; degrees += 1.0) {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/compute/scalar.h"
 #include "design/finite_difference.h"
 #include "design/reflect/input.h"
 #include "fixtures/shapes/shapes.h"
@@ -88,8 +89,6 @@ TEST(ReflectionEnergy, FacesAddUpToTheValueAndToThatOfTheGradient) {
   EXPECT_NEAR(energy.by_face(normals).sum(), value, 1e-12);
   EXPECT_GT(value, 1.001 * energy.direct_value(normals));
 }
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 DirectionSet band() { return band_directions(20.0 * kDegree, {16, 64, 0.0}); }
 
