@@ -38,7 +38,6 @@
 #include "core/io/checkpoint_file.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/lens/overview.h"
 #include "core/optics/light_source.h"
 #include "core/optics/picture_blur.h"
 #include "core/page/drawings.h"

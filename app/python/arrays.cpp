@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
-#include "core/image/transfer.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::python {

@@ -26,7 +26,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/lens_folder.h"
-#include "core/lens/overview.h"
+#include "core/page/drawings.h"
 #include "design/design.h"
 #include "design/render.h"
 #include "design/setup/option_tables.h"

@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 #include "core/page/html_page.h"
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
 namespace {

@@ -17,7 +17,6 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/page/html_page.h"
-#include "core/page/svg_writer.h"
 #include "core/schema/toml.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"

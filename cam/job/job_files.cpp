@@ -20,8 +20,8 @@
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/lens/overview.h"
 #include "core/mesh/mesh_files.h"
+#include "core/page/drawings.h"
 #include "core/text/words.h"
 #include "machine/gcode/program_seal.h"
 

@@ -21,7 +21,6 @@
 #include "core/error.h"
 #include "core/io/lens_folder.h"
 #include "core/page/html_page.h"
-#include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "core/text/words.h"

@@ -9,7 +9,6 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/text/number_text.h"
 

@@ -9,7 +9,6 @@
 #include "cam/report/report_html.h"
 #include "core/image/image.h"
 #include "core/page/html_page.h"
-#include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 

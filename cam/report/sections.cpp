@@ -14,7 +14,6 @@
 #include "core/optics/polish_transfer.h"
 #include "core/page/drawings.h"
 #include "core/page/html_page.h"
-#include "core/page/svg_writer.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 

@@ -10,7 +10,6 @@
 #include <numeric>
 #include <string_view>
 
-#include "core/image/transfer.h"
 #include "core/text/words.h"
 
 namespace lensforge {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "core/schema/description.h"
 #include "core/text/number_text.h"
 

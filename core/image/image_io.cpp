@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/pictures_module.h"
 #include "core/image/svg_drawing.h"
-#include "core/image/transfer.h"
 #include "core/schema/description.h"
 #include "core/text/words.h"
 

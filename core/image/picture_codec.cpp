@@ -26,9 +26,9 @@
 
 #include "core/compute/work_estimate.h"
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_outline.h"
-#include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/sandbox/child_work.h"
 #include "core/text/version.h"

@@ -22,7 +22,6 @@
 #include "core/image/pictures_module.h"
 #include "core/image/rasters.h"
 #include "core/image/svg_drawing.h"
-#include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"

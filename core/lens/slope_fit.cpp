@@ -14,7 +14,7 @@
 #include "core/error.h"
 #include "core/lens/surface_check.h"
 #include "core/mesh/surface_mesh.h"
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
 namespace {

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/image/image.h"
+#include "core/lens/lens.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {
@@ -30,5 +32,10 @@ struct PlotCurve {
 /// fewer than two points in all.
 /// @param label  text alternative.
 std::string decade_plot(const std::vector<PlotCurve>& curves, std::string_view label);
+
+/// Overview picture: the target, pictures of its size, and the surface side by side, each in the
+/// orientation of the target. The surface is a relief lit from the upper left, without its broad
+/// curvature and with stretched contrast, which shows creases too shallow to see otherwise.
+Image draw_overview(const Lens& lens, const std::vector<Image>& pictures);
 
 }  // namespace lensforge

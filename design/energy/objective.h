@@ -13,7 +13,6 @@
 
 #include "core/compute/executor.h"
 #include "core/image/image.h"
-#include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
 #include "core/optics/optical_setup.h"

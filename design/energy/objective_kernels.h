@@ -8,7 +8,7 @@
 
 #include "core/compute/host_device.h"
 #include "core/compute/scalar.h"
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "design/energy/objective_view.h"
 #include "design/energy/picture_terms.h"
 #include "design/energy/smoothness.h"

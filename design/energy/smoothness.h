@@ -10,7 +10,6 @@
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
 #include "core/compute/scalar.h"
-#include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/energy/objective_view.h"
 

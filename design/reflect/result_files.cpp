@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "core/compute/executor.h"
+#include "core/image/color.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
-#include "core/image/transfer.h"
 #include "core/io/checkpoint_file.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"

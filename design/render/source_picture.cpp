@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/image/color.h"
 #include "core/image/image.h"
-#include "core/image/transfer.h"
 #include "core/optics/light_source.h"
 #include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"

@@ -12,7 +12,6 @@
 #include <tuple>
 #include <vector>
 
-#include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
 #include "core/optics/outline.h"

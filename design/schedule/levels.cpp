@@ -10,7 +10,6 @@
 #include "core/image/image_io.h"
 #include "core/lens/slope_fit.h"
 #include "core/lens/smooth_surface.h"
-#include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
 #include "core/spline/control_net.h"

@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/svg_drawing.h"
-#include "core/image/transfer.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"
 #include "core/text/read_numbers.h"

@@ -7,7 +7,7 @@
 
 #include "core/lens/continued_surface.h"
 #include "core/optics/polish_transfer.h"
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
 namespace {

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/outline.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
-#include "core/image/transfer.h"
 
 namespace lensforge {
 

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 #include "export/spline/net_outline.h"
 
 namespace lensforge {

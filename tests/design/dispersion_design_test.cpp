@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/image/color.h"
-#include "core/image/transfer.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
 #include "design/design.h"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/outline.h"
 #include "core/spline/sample_splines.h"

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
-#include "core/image/transfer.h"
 #include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/export.h"

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "core/lens/slope_fit.h"
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 #include "design/design.h"
 #include "design/render.h"
 #include "design/render/wanted_picture.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `lensforge view`, its page opened in a real browser.
 #include "app/view/browser.h"
+#include "core/image/color.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
 #include "core/image/rasters.h"
-#include "core/image/transfer.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {

@@ -109,7 +109,7 @@ async function decodeSurface(stored, lensSize) {
 }
 
 // Values and slopes of the four cubic B-splines over [0, cells] that are not 0 at each of the nodes,
-// `samples` to a knot cell; the knots at the ends are fourfold (core/spline/cubic_spline.h).
+// `samples` to a knot cell; the knots at the ends are fourfold (core/spline/control_net.h).
 function basisTable(cells, samples) {
   const table = new Float32Array(8 * (cells * samples + 1));
   for (let i = 0; i <= cells * samples; ++i) {

@@ -10,13 +10,12 @@
 
 #include "app/view/browser.h"
 #include "app/view/lens_view.h"
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/front.h"
 #include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 #include "core/spline/control_net.h"
-#include "core/spline/cubic_spline.h"
 #include "core/temp_folder.h"
 #include "design/render.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/mesh/surface_mesh.h"
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge::stored_surface_test {
 namespace {

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_refusal.h"
-#include "core/image/transfer.h"
 #include "core/temp_folder.h"
 
 namespace lensforge {

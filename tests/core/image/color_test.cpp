@@ -16,7 +16,6 @@
 #include "core/image/image_io.h"
 #include "core/image/metadata_samples.h"
 #include "core/image/picture_codec.h"
-#include "core/image/transfer.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"
 

@@ -17,8 +17,8 @@
 
 #include "core/error.h"
 #include "core/full_disk.h"
+#include "core/image/color.h"
 #include "core/image/picture_refusal.h"
-#include "core/image/transfer.h"
 #include "core/sample_files.h"
 #include "core/temp_folder.h"
 #include "core/test_images.h"

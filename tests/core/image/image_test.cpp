@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/image/color.h"
 #include "core/image/image_io.h"
-#include "core/image/transfer.h"
 #include "core/test_images.h"
 
 namespace lensforge {

@@ -15,9 +15,9 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_refusal.h"
-#include "core/image/transfer.h"
 #include "core/stop_bound.h"
 #include "core/temp_folder.h"
 

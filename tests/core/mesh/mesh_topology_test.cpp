@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/mesh/mesh_topology.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <vector>
 
-#include "core/mesh/mesh_topology.h"
 #include "design/finite_difference.h"
 #include "design/random_corners.h"
 #include "design/random_input.h"

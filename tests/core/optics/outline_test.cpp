@@ -15,7 +15,6 @@
 #include "core/error.h"
 #include "core/lens/lens.h"
 #include "core/mesh/mesh_files.h"
-#include "core/mesh/mesh_topology.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"

@@ -15,7 +15,6 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/spline/cubic_spline.h"
 #include "core/spline/sample_splines.h"
 #include "core/temp_folder.h"
 

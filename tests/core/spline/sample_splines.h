@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/spline/control_net.h"
-#include "core/spline/cubic_spline.h"
 
 namespace lensforge::testing {
 

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "design/energy/objective_kernels.h"
 #include "design/energy/picture_terms.h"
 #include "design/energy/smoothness.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "design/energy/objective.h"
 #include "design/finite_difference.h"
 #include "design/objective_setups.h"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "core/spline/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"

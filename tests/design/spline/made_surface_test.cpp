@@ -12,7 +12,7 @@
 
 #include "core/error.h"
 #include "core/lens/continued_surface.h"
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 #include "core/spline/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"

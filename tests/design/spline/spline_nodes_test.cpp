@@ -11,7 +11,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/spline/cubic_spline.h"
+#include "core/spline/control_net.h"
 #include "core/spline/sample_splines.h"
 #include "design/finite_difference.h"
 #include "design/random_input.h"

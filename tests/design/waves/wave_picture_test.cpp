@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "cam/analytic_fields.h"
-#include "core/image/transfer.h"
+#include "core/image/color.h"
 #include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
 #include "design/render.h"
