@@ -5,7 +5,7 @@
 
 #include "app/frame/command_run.h"
 #include "app/frame/option_set.h"
-#include "cam/coupon/coupon_layout.h"
+#include "cam/coupon/coupon.h"
 #include "design/reflect.h"
 #include "export/export.h"
 

@@ -19,7 +19,7 @@
 #include "app/view/lens_view.h"
 #include "cam/cam.h"
 #include "cam/proposal/proposal.h"
-#include "cam/report/report_maps.h"
+#include "cam/report/report_html.h"
 #include "core/error.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"

@@ -21,7 +21,6 @@
 #include "cam/predict/part_surfaces.h"
 #include "cam/report/report_data.h"
 #include "cam/report/report_html.h"
-#include "cam/report/report_maps.h"
 #include "core/compute/executor.h"
 #include "core/error.h"
 #include "core/image/color.h"

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "cam/contact/ball_cutter.h"
-#include "cam/contact/index_of.h"
 #include "core/compute/scalar.h"
 #include "core/error.h"
 

@@ -4,11 +4,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "cam/contact/ball_cutter.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/workshop/tool.h"
+#include "cam/workshop/workshop.h"
 #include "core/mesh/surface_mesh.h"
 
 /// A vertical cutter of any profile against points, edges and facets.
@@ -17,7 +19,6 @@
 /// position of the axis. A point q holds the tool up at f(q) = q.z − g(|q.xy − p|); the answer for
 /// a set of points is the largest f over it. g is convex and nowhere falling, so f is concave on a
 /// triangle: its maximum is the tangent contact inside the facet, or it lies on an edge.
-
 namespace lensforge {
 
 /// Height of the tip of the tool that rests on point q, mm; kNoContact if q is not under it.
@@ -100,6 +101,52 @@ class ProfileCutter {
   std::vector<Eigen::Matrix3d> corners_;
   std::vector<std::int32_t> triangle_of_;
   std::vector<std::int32_t> item_of_;  ///< Inverse of triangle_of_.
+};
+
+/// Minimum height of a tool's tip: on the surface plus an allowance, with shank and holder clear of
+/// it as well, and the whole tool clear of the clamps.
+///
+/// Beyond hold() outside the surface's rim the tip keeps the height that it has there, where its
+/// rounded edge has dropped by 0.3 of the edge's radius: enough to clear the rim of surfaces that
+/// fall towards it without cutting more beside the part.
+class TipFloor {
+ public:
+  /// Contacts that hold the tip up near a place, to start the next search from: one per part of the
+  /// tool.
+  using Trace = std::vector<CutterLocation>;
+
+  /// @param surface  must outlive this. @param keep_outs  must outlive this.
+  TipFloor(const ProfileCutter& surface, const Tool& tool, double allowance,
+           std::span<const KeepOut> keep_outs, double clearance);
+  /// Without clamps. @param rim  of this part, where the surface holds several.
+  TipFloor(const ProfileCutter& surface, const Tool& tool, double allowance,
+           const Eigen::AlignedBox2d& rim);
+
+  /// Maximum of the tip's minimum height over all places within `reach` of p, mm: a move of length
+  /// 2·reach around p that stays above it cuts into nothing.
+  [[nodiscard]] double over(const Eigen::Vector2d& p, double reach, Trace& trace) const;
+  /// The same without the clamps, and with nothing but the clamps.
+  [[nodiscard]] double over_surface(const Eigen::Vector2d& p, double reach, Trace& trace) const;
+  [[nodiscard]] double over_clamps(const Eigen::Vector2d& p, double reach) const;
+  [[nodiscard]] bool has_clamps() const { return !keep_outs_.empty(); }
+
+  /// A lower bound of over(p, 0, …), found faster: from the contacts near p.
+  [[nodiscard]] double at_least(const Eigen::Vector2d& p, const Trace& trace) const;
+
+  /// Distance beyond the rim at which the tip starts to keep its height, mm.
+  [[nodiscard]] double hold() const { return hold_; }
+  static double hold_of(const Tool& tool, double allowance);
+
+ private:
+  [[nodiscard]] Eigen::Vector2d held(const Eigen::Vector2d& p) const;
+
+  const ProfileCutter& surface_;
+  Eigen::AlignedBox2d rim_;
+  std::span<const KeepOut> keep_outs_;
+  double clearance_;
+  std::vector<CutterProfile> parts_;  ///< Of the tool with its allowance.
+  std::vector<CutterProfile> whole_;  ///< Of the tool with its clearance from clamps.
+  double hold_;
 };
 
 }  // namespace lensforge

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cam/coupon/coupon_readings.h"
+#include "cam/coupon/coupon.h"
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/coupon/coupon_readings.h"
+#include "cam/coupon/coupon.h"
 #include "cam/workshop/workshop.h"
 
 namespace lensforge {

@@ -8,9 +8,8 @@
 
 #include "cam/contact/cut_surface.h"
 #include "cam/contact/profile_cutter.h"
+#include "cam/coupon/coupon.h"
 #include "cam/coupon/coupon_fit.h"
-#include "cam/coupon/coupon_layout.h"
-#include "cam/coupon/coupon_readings.h"
 #include "cam/path/collision.h"
 #include "cam/plan/program_watch.h"
 #include "cam/post/program_writer.h"

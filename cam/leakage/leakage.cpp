@@ -13,9 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "cam/contact/index_of.h"
 #include "cam/leakage/render_field.h"
-#include "cam/leakage/surface_tile.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/optics/optical_setup.h"
 #include "core/optics/picture_blur.h"

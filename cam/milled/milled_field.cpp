@@ -10,7 +10,6 @@
 #include <tuple>
 #include <utility>
 
-#include "cam/contact/index_of.h"
 #include "cam/milled/ball_sweep.h"
 #include "core/compute/scalar.h"
 #include "core/error.h"

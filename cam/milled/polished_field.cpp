@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "cam/contact/index_of.h"
 #include "cam/milled/creases.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 

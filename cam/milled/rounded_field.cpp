@@ -9,8 +9,8 @@
 #include <limits>
 #include <optional>
 
-#include "cam/contact/index_of.h"
 #include "cam/milled/ball_sweep.h"
+#include "core/compute/scalar.h"
 #include "core/mesh/surface_mesh.h"
 
 namespace lensforge {

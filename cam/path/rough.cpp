@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cam/path/tip_floor.h"
+#include "cam/contact/profile_cutter.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
 

@@ -10,7 +10,6 @@
 #include "cam/contact/profile_cutter.h"
 #include "cam/path/operation.h"
 #include "cam/path/stock_map.h"
-#include "cam/path/tip_floor.h"
 #include "cam/workshop/tool.h"
 #include "cam/workshop/workshop.h"
 #include "core/compute/executor.h"

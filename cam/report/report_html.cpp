@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "cam/report/report_maps.h"
 #include "cam/report/verdict.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"

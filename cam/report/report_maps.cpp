@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/report/report_maps.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>

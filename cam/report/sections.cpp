@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "cam/report/report_html.h"
-#include "cam/report/report_maps.h"
 #include "cam/tolerance/part_error.h"
 #include "core/optics/front.h"
 #include "core/optics/polish_transfer.h"

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <vector>
 
-#include "cam/leakage/surface_tile.h"
+#include "cam/leakage/render_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/tolerance/part_heights.h"
 #include "cam/tolerance/part_light.h"

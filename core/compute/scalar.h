@@ -2,12 +2,16 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <numbers>
 
 // Small functions of single numbers.
 namespace lensforge {
+
+/// A number as an index of the standard library's containers. @pre value ≥ 0
+constexpr std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 /// A function of one variable: value and slope.
 struct ValueSlope {

@@ -12,7 +12,7 @@
 #include "app/commands/send_command.h"
 #include "app/commands/settings.h"
 #include "app/frame/option_set.h"
-#include "cam/coupon/coupon_layout.h"
+#include "cam/coupon/coupon.h"
 #include "cam/plan/cam_options.h"
 #include "core/error.h"
 #include "core/image/image_io.h"

@@ -5,7 +5,7 @@
 
 #include "app/frame/command_line.h"
 #include "app/frame/option_set.h"
-#include "cam/coupon/coupon_layout.h"
+#include "cam/coupon/coupon.h"
 #include "cam/plan/cam_options.h"
 #include "core/error.h"
 #include "core/text/number_text.h"

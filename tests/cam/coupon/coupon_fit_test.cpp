@@ -7,8 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cam/coupon/coupon_layout.h"
-#include "cam/coupon/coupon_readings.h"
+#include "cam/coupon/coupon.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "cam/coupon/coupon_readings.h"
+#include "cam/coupon/coupon.h"
 #include "core/compute/scalar.h"
 
 namespace lensforge {

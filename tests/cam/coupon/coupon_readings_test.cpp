@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/coupon/coupon_readings.h"
-
 #include <gmock/gmock.h>
 
 #include <optional>
 #include <string>
 
-#include "cam/coupon/coupon_layout.h"
+#include "cam/coupon/coupon.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 

@@ -11,8 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "cam/coupon/coupon_layout.h"
-#include "cam/coupon/coupon_readings.h"
+#include "cam/coupon/coupon.h"
 #include "cam/post/program_reader.h"
 
 namespace lensforge::testing {

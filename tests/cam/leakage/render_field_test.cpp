@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "cam/analytic_fields.h"
-#include "cam/leakage/surface_tile.h"
 #include "core/error.h"
 #include "core/optics/light_source.h"
 #include "core/optics/optical_setup.h"
