@@ -28,7 +28,7 @@
 #include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/preflight.h"
-#include "machine/stream/program_file.h"
+#include "machine/stream/program_facts.h"
 
 namespace lensforge {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/text/number_text.h"
-#include "machine/stream/line_tracker.h"
+#include "machine/stream/send_steps.h"
 
 namespace lensforge {
 namespace {

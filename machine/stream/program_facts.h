@@ -4,8 +4,10 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <istream>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -111,6 +113,29 @@ struct JournalRecord {
   std::int64_t runs = 0;               ///< Number of starts and resumptions of the job.
   std::int64_t bytes = 0;              ///< Length of the valid part of the file.
   std::int64_t torn = 0;               ///< Number of bytes after it: a truncated record.
+};
+
+struct ProgramPieces;
+
+/// A program that is read once when opened; later reads return the same bytes or fail. If the file
+/// is replaced, overwritten, truncated or extended meanwhile, nothing is checked or sent that does
+/// not belong to identity().
+///
+/// Each piece of 64 KiB is hashed at the first reading and again whenever it is read; the hashes
+/// take 1/2000 of the file's size in memory.
+class ProgramFile {
+ public:
+  /// @throw InputError naming the path if it is missing, is no regular file or cannot be read;
+  ///        Interrupted
+  explicit ProgramFile(const std::filesystem::path& path, const RunControl& control = {});
+
+  [[nodiscard]] const JobIdentity& identity() const;
+  /// Returns a seekable stream of its bytes, independent of this object's life. Reading throws
+  /// RunError naming the path if the file has changed.
+  [[nodiscard]] std::unique_ptr<std::istream> open() const;
+
+ private:
+  std::shared_ptr<const ProgramPieces> pieces_;
 };
 
 }  // namespace lensforge

@@ -10,7 +10,6 @@
 #include "machine/guard/guard.h"
 #include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"
-#include "machine/stream/line_tracker.h"
 #include "machine/stream/send_steps.h"
 
 namespace lensforge {

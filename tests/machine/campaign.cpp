@@ -24,7 +24,6 @@
 #include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"
 #include "machine/stream/program_facts.h"
-#include "machine/stream/program_file.h"
 #include "machine/stream/resume_plan.h"
 #include "machine/stream/sender.h"
 

@@ -13,7 +13,7 @@
 
 #include "core/full_disk.h"
 #include "core/temp_folder.h"
-#include "machine/stream/program_file.h"
+#include "machine/stream/program_facts.h"
 
 namespace lensforge {
 namespace {

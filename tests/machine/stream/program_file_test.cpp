@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/stream/program_file.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -11,6 +9,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/temp_folder.h"
+#include "machine/stream/program_facts.h"
 #include "machine/stream/program_feed.h"
 
 namespace lensforge {
