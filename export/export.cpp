@@ -24,7 +24,7 @@
 #include "design/render/wanted_picture.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"
-#include "export/solid/iges_file.h"
+#include "export/solid/solid_files.h"
 
 namespace lensforge {
 namespace {

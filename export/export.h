@@ -13,7 +13,7 @@
 #include "core/lens/lens.h"
 #include "core/schema/description.h"
 #include "export/files/height_map.h"
-#include "export/solid/step_file.h"
+#include "export/solid/solid_files.h"
 #include "export/spline/spline_fit.h"
 
 namespace lensforge {

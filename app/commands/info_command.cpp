@@ -26,8 +26,7 @@
 #include "core/optics/light_path.h"
 #include "core/text/words.h"
 #include "export/files/mesh_formats.h"
-#include "export/solid/iges_file.h"
-#include "export/solid/step_file.h"
+#include "export/solid/solid_files.h"
 #include "machine/gcode.h"
 
 namespace lensforge::app {

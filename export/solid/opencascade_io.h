@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "core/compute/executor.h"
-#include "export/solid/step_file.h"
+#include "export/solid/solid_files.h"
 #include "export/spline/spline_net.h"
 
 /// Reading and writing of solids in any format. OpenCASCADE crashes on some broken files and never

@@ -45,8 +45,8 @@
 #include "core/sandbox/child_work.h"
 #include "core/spline/control_net.h"
 #include "export/solid/opencascade_io.h"
+#include "export/solid/solid_files.h"
 #include "export/solid/solids_module.h"
-#include "export/solid/step_file.h"
 
 namespace lensforge {
 namespace {

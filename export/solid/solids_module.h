@@ -7,12 +7,11 @@
 #include <string_view>
 
 #include "core/sandbox/module.h"
-#include "export/solid/iges_file.h"
+#include "export/solid/solid_files.h"
 #include "export/solid/solid_reading.h"
-#include "export/solid/step_file.h"
 
 /// The module "solids": all code that calls OpenCASCADE. The functions of the same names in
-/// step_file.h, iges_file.h and solid_reading.h have the contracts.
+/// solid_files.h and solid_reading.h have the contracts.
 namespace lensforge::solids_module {
 
 std::int64_t check_part21(std::string_view content, const std::string& name);

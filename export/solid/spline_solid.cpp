@@ -44,7 +44,7 @@
 #include "core/error.h"
 #include "core/optics/front.h"
 #include "export/solid/opencascade_io.h"
-#include "export/spline/net_outline.h"
+#include "export/spline/spline_net.h"
 
 namespace lensforge {
 namespace {

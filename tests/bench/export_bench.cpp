@@ -10,7 +10,7 @@
 #include "cam/cam_meshes.h"
 #include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
-#include "export/solid/step_file.h"
+#include "export/solid/solid_files.h"
 #include "export/spline/spline_fit.h"
 
 namespace lensforge {

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "export/solid/iges_file.h"
+#include "export/solid/solid_files.h"
 
 namespace lensforge::testing {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/solid/iges_file.h"
-
 #include <gmock/gmock.h>
 
 #include "core/error.h"
@@ -9,6 +7,7 @@
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/opencascade_io.h"
+#include "export/solid/solid_files.h"
 #include "export/spline/spline_fit.h"
 
 namespace lensforge::testing {

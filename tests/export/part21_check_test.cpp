@@ -3,7 +3,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "export/solid/step_file.h"
+#include "export/solid/solid_files.h"
 
 namespace lensforge::testing {
 namespace {

@@ -10,9 +10,8 @@
 #include "core/lens/smooth_surface.h"
 #include "core/temp_folder.h"
 #include "export/sample_surfaces.h"
-#include "export/solid/iges_file.h"
+#include "export/solid/solid_files.h"
 #include "export/solid/solid_reading.h"
-#include "export/solid/step_file.h"
 #include "export/spline/spline_fit.h"
 
 // Files of solids that are broken in one place, each read in this process: OpenCASCADE crashes at

@@ -16,8 +16,8 @@
 #include "export/foreign_step.h"
 #include "export/sample_surfaces.h"
 #include "export/solid/opencascade_io.h"
+#include "export/solid/solid_files.h"
 #include "export/solid/solid_reading.h"
-#include "export/solid/step_file.h"
 #include "export/spline/spline_fit.h"
 
 namespace lensforge::testing {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/solid/step_file.h"
-
 #include <gmock/gmock.h>
 
 #include <array>
@@ -13,6 +11,7 @@
 #include "export/files/closed_solid.h"
 #include "export/part21.h"
 #include "export/sample_surfaces.h"
+#include "export/solid/solid_files.h"
 #include "export/spline/spline_fit.h"
 
 namespace lensforge::testing {

@@ -15,10 +15,9 @@
 #include "export/files/closed_solid.h"
 #include "export/part21.h"
 #include "export/sample_surfaces.h"
-#include "export/solid/iges_file.h"
-#include "export/solid/step_file.h"
-#include "export/spline/net_outline.h"
+#include "export/solid/solid_files.h"
 #include "export/spline/spline_fit.h"
+#include "export/spline/spline_net.h"
 
 namespace lensforge::testing::trimmed_solid_test {
 namespace {
