@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "app/batch/batch_job.h"
-#include "app/batch/job_run.h"
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"

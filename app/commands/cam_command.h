@@ -60,4 +60,27 @@ std::string verdict_text(const Verdict& verdict);
 std::string next_step(const std::filesystem::path& page, const JobResult& job,
                       const CamOptions& cam, int missed);
 
+// Several lenses on one blank.
+
+/// Options of `lensforge nest`.
+struct NestSettings {
+  /// By default every lens is cut out, rectangles too.
+  NestSettings() { nest.cam.cut_outline = OutlineWish::kAlways; }
+
+  std::vector<std::string> sources;  ///< Lens folders; one named twice is cut twice.
+  std::string out;
+  std::string workshop;  ///< TOML file; empty for the defaults.
+  NestOptions nest;
+};
+
+/// Describes every option of the command.
+void describe(Description& d, NestSettings& settings);
+
+/// Overrides the workshop file with the given options. @throw InputError naming file or option,
+/// value and rule.
+void settle(OptionSet& options, NestSettings& settings);
+
+/// Names of the sources' folders; repeated names are numbered: "bee", "bee_2".
+std::vector<std::string> nest_names(const std::vector<std::string>& sources);
+
 }  // namespace lensforge::app

@@ -13,7 +13,6 @@
 #include <string>
 #include <system_error>
 
-#include "app/commands/send_watch.h"
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/commands/send_watch.h"
-
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/stat.h>
@@ -17,6 +15,7 @@
 #include <string_view>
 #include <utility>
 
+#include "app/commands/send_command.h"
 #include "app/frame/common_output.h"
 #include "app/frame/console.h"
 #include "core/error.h"

@@ -10,9 +10,8 @@
 #include <variant>
 
 #include "app/frame/common_output.h"
-#include "app/python/arrays.h"
 #include "app/python/bindings.h"
-#include "app/python/keywords.h"
+#include "app/python/conversions.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/image/rasters.h"

@@ -8,7 +8,6 @@
 
 #include "app/commands/cam_command.h"
 #include "app/commands/design_command.h"
-#include "app/commands/nest_command.h"
 #include "app/commands/send_command.h"
 #include "app/commands/settings.h"
 #include "app/frame/option_set.h"

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include "app/batch/job_run.h"
 #include "core/error.h"
 #include "core/temp_folder.h"
 

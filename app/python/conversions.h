@@ -6,19 +6,23 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "app/frame/option_set.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
 #include "core/mesh/surface_mesh.h"
 
-/// Conversion between numpy arrays and the libraries' values. Results and attributes share the
-/// libraries' memory; arguments are copied once.
+/// Conversion between Python's values and the libraries'.
 namespace lensforge::python {
 
 namespace py = pybind11;
+
+// Numpy arrays. Results and attributes share the libraries' memory; arguments are copied once.
 
 /// C-contiguous arrays; others, and other numeric types, are converted by a copy.
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
@@ -52,5 +56,37 @@ py::array view_of(const Eigen::Matrix3Xi& columns, const py::object& owner);
 py::array array_of(Image&& image);
 py::array array_of(std::vector<double>&& values, const Eigen::Vector2i& pixels);
 py::array array_of(Eigen::Matrix3Xd&& columns);
+
+// Keywords.
+
+/// Keyword arguments of a function: the options of the command of the same name, with '_' for '-'
+/// and without leading dashes. Limits and defaults are those of the options' descriptions.
+class Keywords {
+ public:
+  enum class Defaults {
+    kOwn,      ///< The fields' values.
+    kOfALens,  ///< A lens's, which the fields' values are not.
+  };
+
+  /// @param fields    the command's options.
+  /// @param withheld  options that the function does not take, such as "--out".
+  Keywords(std::string function, const Description& fields, const std::set<std::string>& withheld,
+           Defaults defaults = Defaults::kOwn);
+
+  /// The values of the options.
+  /// @throw TypeError (Python's) naming function and keyword for an unknown keyword or a value of
+  ///        the wrong type; InputError naming keyword, value and rule.
+  [[nodiscard]] app::OptionValues values(const py::dict& given) const;
+
+  /// Describes the keywords, their values and defaults, for a docstring.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  [[nodiscard]] const FieldSpec& spec_of(const std::string& keyword) const;
+
+  std::string function_;
+  std::vector<FieldSpec> specs_;
+  std::map<std::string, std::string> defaults_;  ///< By option; empty texts where there is none.
+};
 
 }  // namespace lensforge::python
