@@ -296,11 +296,11 @@ void PlaneField::propagate() {
 
 void PlaneField::return_back() { go(true); }
 
-/// A component with the direction s turns by −k D b s² / 2m, b the mean ray's bend and m the
-/// magnification (Sziklas and Siegman, Applied Optics 14, 1975); the adjoint turns it back.
+/// A component with the direction s turns by −k D s² / 2m, m the magnification (Sziklas and
+/// Siegman, Applied Optics 14, 1975); the adjoint turns it back.
 void PlaneField::go(bool back) {
   transform(values_, plan_.columns, plan_.rows, FFTW_FORWARD);
-  const Eigen::Vector2d way = plan_.distance * plan_.bend().cwiseQuotient(plan_.magnification);
+  const Eigen::Vector2d way = plan_.distance * plan_.magnification.cwiseInverse();
   UnitPhases phases;
   const auto factors = [&](int count, int axis, double scale) {
     std::vector<double> turns;
@@ -327,21 +327,15 @@ void PlaneField::go(bool back) {
 }
 
 PlaneField::Vertex laid_ray(const FieldPlan& plan, const PlaneField::Vertex& ray) {
-  const double secant = 1.0 / std::sqrt(1.0 - ray.cosine.squaredNorm());
-  const double mean_secant = 1.0 / std::sqrt(1.0 - plan.cosine.squaredNorm());
-  const Eigen::Vector2d mean_slope = plan.cosine * mean_secant;
-  const Eigen::Vector2d bend = plan.bend();
-  const Eigen::Vector2d off = ray.cosine - plan.cosine;
-  const Eigen::Vector2d bent = bend.cwiseProduct(off);
+  const double square = ray.cosine.squaredNorm();
+  const double secant = 1.0 / std::sqrt(1.0 - square);
   PlaneField::Vertex laid = ray;
-  laid.place += plan.distance * (ray.cosine * secant - mean_slope - bent);
-  const double shorter = secant - mean_secant - plan.cosine.dot(bent) - 0.5 * off.dot(bent);
+  laid.place += plan.distance * (secant - 1.0) * ray.cosine;
   const Eigen::Vector2d from = laid.place - plan.centre;
-  const Eigen::Vector2d curved = (Eigen::Vector2d::Ones() - plan.magnification)
-                                     .cwiseQuotient(plan.distance * bend)
-                                     .cwiseProduct(from);
-  laid.path += plan.distance * shorter - plan.cosine.dot(from) + 0.5 * from.dot(curved);
-  laid.cosine = off + curved;
+  const Eigen::Vector2d curved =
+      (Eigen::Vector2d::Ones() - plan.magnification).cwiseProduct(from) / plan.distance;
+  laid.path += plan.distance * (secant - 1.0 - 0.5 * square) + 0.5 * from.dot(curved);
+  laid.cosine = ray.cosine + curved;
   return laid;
 }
 
@@ -351,13 +345,17 @@ namespace {
 class NodesOnPixels {
  public:
   NodesOnPixels(const FieldPlan& plan, const OnPicture& to)
-      : by_node_(to.by_mm * plan.magnification.cwiseProduct(plan.step).asDiagonal()),
-        origin_(to.centre - by_node_ * plan.middle()),
-        cell_(by_node_.cwiseAbs().rowwise().sum()) {
-    const Eigen::Vector2d half =
-        0.5 * by_node_.cwiseAbs() * Eigen::Vector2d(plan.columns, plan.rows) + cell_;
-    low = (to.centre - half).array().floor().cast<int>().max(0);
-    high = (to.centre + half).array().ceil().cast<int>().min(to.pixels.array());
+      : to_(to),
+        step_(plan.magnification.cwiseProduct(plan.step)),
+        middle_(plan.middle()),
+        divergence_(plan.divergence()),
+        cell_((to.by_mm * step_.asDiagonal()).cwiseAbs().rowwise().sum()) {
+    Eigen::AlignedBox2d box;
+    for (const int j : {0, plan.rows / 2, plan.rows}) {
+      for (const int i : {0, plan.columns / 2, plan.columns}) box.extend(lands(i, j));
+    }
+    low = (box.min() - cell_).array().floor().cast<int>().max(0);
+    high = (box.max() + cell_).array().ceil().cast<int>().min(to.pixels.array());
   }
 
   Eigen::Vector2i low;   ///< First pixel.
@@ -371,7 +369,7 @@ class NodesOnPixels {
   template <class Take>
   void for_each_pixel(int i, int j, const Take& take) const {
     // Most cells touch one pixel.
-    const Eigen::Vector2d from = origin_ + by_node_ * Eigen::Vector2d(i, j) - 0.5 * cell_;
+    const Eigen::Vector2d from = lands(i, j) - 0.5 * cell_;
     const Eigen::Vector2d to = from + cell_;
     const Eigen::Vector2d pixel = from.array().floor();
     if ((to.array() < pixel.array() + 1.0).all()) {
@@ -388,6 +386,13 @@ class NodesOnPixels {
   }
 
  private:
+  /// Where a node's light lands, pixel coordinates.
+  [[nodiscard]] Eigen::Vector2d lands(int i, int j) const {
+    const Eigen::Vector2d at = (Eigen::Vector2d(i, j) - middle_).cwiseProduct(step_);
+    const Eigen::Vector2d wider = divergence_.cwiseProduct(at);
+    const double way = -to_.tilt.dot(at) / (1.0 + to_.tilt.dot(wider));
+    return to_.centre + to_.by_mm * (at + way * wider);
+  }
   [[nodiscard]] std::size_t number(int column, int row) const {
     return static_cast<std::size_t>(row - low.y()) * static_cast<std::size_t>(columns()) +
            static_cast<std::size_t>(column - low.x());
@@ -404,9 +409,10 @@ class NodesOnPixels {
     }
   }
 
-  Eigen::Matrix2d by_node_;
-  Eigen::Vector2d origin_;  ///< Of the first node, pixel coordinates.
-  Eigen::Vector2d cell_;    ///< Pixels.
+  OnPicture to_;
+  Eigen::Vector2d step_;  ///< Of the nodes where they land, mm.
+  Eigen::Vector2d middle_, divergence_;
+  Eigen::Vector2d cell_;  ///< Pixels.
 };
 
 }  // namespace

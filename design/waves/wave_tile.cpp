@@ -145,11 +145,11 @@ class WaveTile {
   /// A ray where it leaves the surface.
   struct Node {
     bool lit = false;
-    Eigen::Vector2d q;       ///< mm
-    Eigen::Vector2d cosine;  ///< p
-    Eigen::Vector2d slope;   ///< m
-    double path = 0.0;       ///< W, mm
-    double rise = 0.0;       ///< ∂W/∂z of the surface, where the ray meets the starting plane.
+    Eigen::Vector3d direction;  ///< Of the light behind the surface, unit.
+    Eigen::Vector2d q;          ///< mm
+    Eigen::Vector2d cosine;     ///< p
+    double path = 0.0;          ///< W, mm; up to the surface before start_rays().
+    double rise = 0.0;  ///< ∂W/∂z of the surface, where the ray meets the starting plane.
     double window = 0.0;
     double light = 0.0;         ///< Of the triangles around.
     PlaneField::Vertex laid{};  ///< laid_ray(); its amplitude with the window.
@@ -161,21 +161,24 @@ class WaveTile {
   }
 
   void trace(const TilePlan* plan) {
-    plan_.level = plan != nullptr ? plan->level : level();
     const std::size_t count = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
     nodes_.assign(count, {});
     corners_.resize(count);
     for (int j = 0; j < rows_; ++j) {
-      for (int i = 0; i < columns_; ++i) trace_node(i, j, plan_.level);
+      for (int i = 0; i < columns_; ++i) trace_node(i, j);
     }
     gather_light();
     if (is_dark()) return;
     if (plan != nullptr) {
       plan_ = *plan;
+      start_rays();
       lay_rays();
       // From a new plane, too: a plan depends on the nodes alone.
       if (!fits()) return trace(nullptr);
     } else {
+      plan_.frame = TileFrame(mean_);
+      plan_.frame.level = level(mean_);
+      start_rays();
       make_plan();
     }
     weigh_nodes();
@@ -183,18 +186,18 @@ class WaveTile {
     plan_.divided = should_be_divided();
   }
 
-  /// z of the starting plane: the mean height of the tile, but that of its part of the lens's rim
-  /// if it has one, since the rim's diffraction starts there. 0.3 mm above it a portrait in one
-  /// piece changes by 0.0004 (MAE).
-  [[nodiscard]] double level() const {
+  /// Where the starting plane is along an axis: at the mean of the tile, but at that of its part of
+  /// the lens's rim if it has one, since the rim's diffraction starts there. 0.3 mm above it a
+  /// portrait in one piece changes by 0.0004 (MAE).
+  [[nodiscard]] double level(const Eigen::Vector3d& axis) const {
     double sum = 0.0, rim = 0.0;
     int rim_nodes = 0;
     for (int j = 0; j < rows_; ++j) {
       for (int i = 0; i < columns_; ++i) {
-        const double z = surface_.place[on_surface(i, j)].z();
-        sum += z;
+        const double along = axis.dot(surface_.place[on_surface(i, j)]);
+        sum += along;
         if (!is_on_rim(tile_.x, i) && !is_on_rim(tile_.y, j)) continue;
-        rim += z;
+        rim += along;
         ++rim_nodes;
       }
     }
@@ -232,6 +235,21 @@ class WaveTile {
     return all;
   }
 
+  /// Follows the rays to the starting plane.
+  void start_rays() {
+    const TileFrame& frame = plan_.frame;
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      Node& node = nodes_[k];
+      if (!node.lit) continue;
+      const Eigen::Vector3d from = frame.axes.transpose() * corners_[k];
+      const Eigen::Vector3d direction = frame.axes.transpose() * node.direction;
+      const double way = (frame.level - from.z()) / direction.z();
+      node.q = from.head<2>() + way * direction.head<2>();
+      node.cosine = direction.head<2>();
+      node.path += way;
+    }
+  }
+
   void lay_rays() {
     for (Node& node : nodes_) {
       if (!node.lit) continue;
@@ -245,17 +263,14 @@ class WaveTile {
   /// Where a ray lands, from the mean ray, mm before magnification.
   [[nodiscard]] Eigen::Vector2d landing(const Node& node) const {
     const FieldPlan& field = plan_.field;
-    return from_centre(node) + (field.distance * field.bend())
-                                   .cwiseProduct(node.laid.cosine)
-                                   .cwiseQuotient(field.magnification);
+    return from_centre(node) + field.distance * node.laid.cosine.cwiseQuotient(field.magnification);
   }
 
-  void trace_node(int i, int j, double level) {
+  void trace_node(int i, int j) {
     const std::size_t k = index({i, j});
     const std::size_t n = on_surface(i, j);
     const LightPath& light = color_.light;
     const Eigen::Vector3d& p = surface_.place[n];
-    const Eigen::Vector2d xy = p.head<2>();
     const Eigen::Vector2d& slope = surface_.slope[n];
     const Eigen::Vector3d normal = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
     const std::optional<IncidentRay> ray = incident_ray(light, p);
@@ -264,14 +279,12 @@ class WaveTile {
     Node& node = nodes_[k];
     node.lit = light.transmits(p, normal, known);
     if (!node.lit) return;
-    node.slope = light.beam(p, normal, known).m;
-    const double secant = std::sqrt(1.0 + node.slope.squaredNorm());
-    node.cosine = node.slope / secant;
-    node.q = xy + (level - p.z()) * node.slope;
-    node.path = color_.path.to(p, known) + (level - p.z()) * secant;
-    node.rise = color_.path.rise(p, known) - 1.0 / secant;
+    const Eigen::Vector2d m = light.beam(p, normal, known).m;
+    node.direction = Eigen::Vector3d(m.x(), m.y(), 1.0).normalized();
+    node.path = color_.path.to(p, known);
+    node.rise = color_.path.rise(p, known) - node.direction.z();
     // An outline's edge fades over one step of the rays, far below √(λ f).
-    const bool in = edge_ == nullptr || edge_->contains(xy);
+    const bool in = edge_ == nullptr || edge_->contains(p.head<2>());
     node.window = in ? tile_.x.window(tile_.x.begin + i) * tile_.y.window(tile_.y.begin + j) : 0.0;
   }
 
@@ -314,7 +327,7 @@ class WaveTile {
 
   /// The light around the nodes, all of the tile's, and its mean ray.
   void gather_light() {
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    mean_.setZero();
     whole_ = 0.0;
     for_each_triangle([&](const Three& t) {
       if (!is_bright(t)) return;
@@ -323,11 +336,11 @@ class WaveTile {
         Node& node = nodes_[index(c)];
         node.light += flux;
         const double light = flux * node.window * node.window / 3.0;
-        mean += light * node.cosine;
+        mean_ += light * node.direction;
         whole_ += light;
       }
     });
-    if (!is_dark()) mean_ = mean / whole_;
+    mean_.normalize();
   }
 
   /// Amplitudes at the nodes, from the light and the area of the triangles around them.
@@ -377,7 +390,8 @@ class WaveTile {
     for_each_ray([&](const Three& t, double flux) {
       std::array<Eigen::Vector2d, 3> places;
       for (std::size_t k = 0; k < 3; ++k) {
-        places[k] = color_.light.land(corners_[index(t[k])], nodes_[index(t[k])].slope);
+        const std::size_t n = index(t[k]);
+        places[k] = color_.light.land(corners_[n], slope_of(nodes_[n].direction));
       }
       add_ray(places, flux, light);
     });
@@ -415,12 +429,10 @@ class WaveTile {
     }
     const Eigen::Vector2d centre = start.center();
     FieldPlan& field = plan_.field;
-    field.cosine = mean_;
     field.centre = centre;
-    const Eigen::Vector2d to =
-        color_.light.land({centre.x(), centre.y(), plan_.level}, field.slope());
-    plan_.far_level = color_.screen.at(to).z();
-    field.distance = plan_.far_level - plan_.level;
+    const TileFrame& frame = plan_.frame;
+    field.distance =
+        frame.axes.col(2).dot(color_.screen.at(lands(centre, frame.level))) - frame.level;
     field.wavelength = color_.wavelength;
     field.magnification = best_magnification();
     plan_.spread = {spread(0, field.magnification.x()), spread(1, field.magnification.y())};
@@ -442,16 +454,15 @@ class WaveTile {
   /// The magnification with which the field has the fewest nodes.
   [[nodiscard]] Eigen::Vector2d best_magnification() const {
     const FieldPlan& field = plan_.field;
-    const Eigen::Vector2d slope = field.slope();
     std::vector<Eigen::Vector2d> from, to;
     for (const Node& node : nodes_) {
       if (!is_bright(node)) continue;
       from.emplace_back(node.q - field.centre);
-      to.emplace_back(from.back() + field.distance * (node.slope - slope));
+      const double secant = 1.0 / std::sqrt(1.0 - node.cosine.squaredNorm());
+      to.emplace_back(from.back() + field.distance * secant * node.cosine);
     }
     Eigen::Vector2d best(1.0, 1.0);
     for (int axis = 0; axis < 2; ++axis) {
-      const double way = field.distance * field.bend()[axis];
       double fewest = HUGE_VAL;
       for (int k = -kMagnifications; k <= kMagnifications; ++k) {
         const double wider = std::pow(kMostWider, static_cast<double>(k) / kMagnifications);
@@ -459,7 +470,7 @@ class WaveTile {
         for (std::size_t n = 0; n < from.size(); ++n) {
           const double begin = from[n][axis];
           const double end = to[n][axis];
-          steepest = std::max(steepest, std::abs(end - wider * begin) / way);
+          steepest = std::max(steepest, std::abs(end - wider * begin) / field.distance);
           start = std::max(start, std::abs(begin));
           far = std::max(far, std::abs(end));
         }
@@ -536,17 +547,31 @@ class WaveTile {
     });
   }
 
+  static Eigen::Vector2d slope_of(const Eigen::Vector3d& direction) {
+    return direction.head<2>() / direction.z();
+  }
+  /// Where a ray along the mean one lands from a place of a plane across it, pixel coordinates.
+  [[nodiscard]] Eigen::Vector2d lands(const Eigen::Vector2d& place, double level) const {
+    const TileFrame& frame = plan_.frame;
+    return color_.light.land(frame.point(place, level), slope_of(frame.axes.col(2)));
+  }
+
   [[nodiscard]] OnPicture on_picture() const {
-    const Eigen::Vector2d slope = plan_.field.slope();
-    const auto land = [&](const Eigen::Vector2d& xy) {
-      return color_.light.land({xy.x(), xy.y(), plan_.far_level}, slope);
-    };
-    const Eigen::Vector2d centre = plan_.field.far_centre();
-    const Eigen::Vector2d at = land(centre);
+    const FieldPlan& field = plan_.field;
+    const double far = plan_.frame.level + field.distance;
+    const Eigen::Vector2d at = lands(field.centre, far);
     Eigen::Matrix2d by_mm;
-    by_mm << land(centre + Eigen::Vector2d::UnitX()) - at,
-        land(centre + Eigen::Vector2d::UnitY()) - at;
-    return {at, by_mm, {color_.screen.plane().columns(), color_.screen.plane().rows()}};
+    by_mm << lands(field.centre + Eigen::Vector2d::UnitX(), far) - at,
+        lands(field.centre + Eigen::Vector2d::UnitY(), far) - at;
+    const Screen& screen = color_.screen;
+    const Eigen::Vector3d from = screen.at(at);
+    const Eigen::Vector3d normal =
+        plan_.frame.axes.transpose() * (screen.at(at + Eigen::Vector2d::UnitX()) - from)
+                                           .cross(screen.at(at + Eigen::Vector2d::UnitY()) - from);
+    return {at,
+            by_mm,
+            {screen.plane().columns(), screen.plane().rows()},
+            normal.head<2>() / normal.z()};
   }
 
   const WaveColor& color_;
@@ -558,7 +583,7 @@ class WaveTile {
   int columns_, rows_;
   std::vector<Node> nodes_;
   std::vector<Eigen::Vector3d> corners_;
-  Eigen::Vector2d mean_{0.0, 0.0};  ///< Direction of all its light, along x and y.
+  Eigen::Vector3d mean_{0.0, 0.0, 1.0};  ///< Direction of all its light.
   double whole_ = 0.0;
   double as_rays_ = 0.0;  ///< Light of directions that are too steep for the field.
   TilePlan plan_;

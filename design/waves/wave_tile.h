@@ -20,22 +20,21 @@
 #include "core/optics/screen.h"
 #include "design/waves/wave_picture.h"
 
-// Notation: q a ray's place on the starting plane, W its optical path up to there, p its direction
-// cosines along x and y, m = p / √(1 − |p|²) its slope; p0 and m0 those of the tile's mean ray. A
-// bar is ∂E/∂.
+// Notation: in the frame of a tile, whose third axis is its mean ray: q a ray's place on the
+// starting plane, W its optical path up to there, p its direction cosines along the first two axes,
+// m = p / √(1 − |p|²) its slope. A bar is ∂E/∂.
 
 namespace lensforge {
 
 // How a field goes from one plane to another, tile by tile.
 
-/// A field on a plane z = const and its way to a parallel one. Without the phase of the mean ray,
-/// and without that of rays that keep to places magnified so: laid fields have little phase left,
-/// and few nodes. Parabolic, for rays that laid_ray() moved.
+/// A field on a plane and its way to a parallel one, along their normal. Without the phase of rays
+/// that keep to places magnified so: laid fields have little phase left, and few nodes. Parabolic,
+/// for rays that laid_ray() moved.
 struct FieldPlan {
   double wavelength = 550e-6;        ///< mm
   double distance = 0.0;             ///< Between the planes, mm, > 0.
-  Eigen::Vector2d centre{0.0, 0.0};  ///< Of the first plane's nodes, mm.
-  Eigen::Vector2d cosine{0.0, 0.0};  ///< Direction of the mean ray, along x and y.
+  Eigen::Vector2d centre{0.0, 0.0};  ///< Of the nodes of both planes, mm.
   /// Of the light on the other plane against that on the first, along x and y, > 0.
   Eigen::Vector2d magnification{1.0, 1.0};
   Eigen::Vector2d step{0.0, 0.0};  ///< Of the nodes, mm.
@@ -50,16 +49,10 @@ struct FieldPlan {
   /// Column and row of the centre.
   [[nodiscard]] Eigen::Vector2i centre_node() const { return Eigen::Vector2i(columns, rows) / 2; }
   [[nodiscard]] Eigen::Vector2d middle() const { return centre_node().cast<double>(); }
-  [[nodiscard]] Eigen::Vector2d slope() const {
-    return cosine / std::sqrt(1.0 - cosine.squaredNorm());
+  /// How the slopes of rays that keep to magnified places change along the other plane, 1/mm.
+  [[nodiscard]] Eigen::Vector2d divergence() const {
+    return (Eigen::Vector2d::Ones() - magnification.cwiseInverse()) / distance;
   }
-  /// Derivatives of the mean ray's slope by its direction, along x and y.
-  [[nodiscard]] Eigen::Vector2d bend() const {
-    const double c = std::sqrt(1.0 - cosine.squaredNorm());
-    return (1.0 / c + cosine.array().square() / (c * c * c)).matrix();
-  }
-  /// Where the mean ray from the centre meets the other plane, mm.
-  [[nodiscard]] Eigen::Vector2d far_centre() const { return centre + distance * slope(); }
 };
 
 /// The next size of 2, 3, 5 and 7 from `least` up, even: fast to transform.
@@ -67,11 +60,14 @@ struct FieldPlan {
 int transform_size(double least);
 inline constexpr double kMostTransform = 1e7;
 
-/// How a plane lies on a picture.
+/// How a plane's light lands on a picture, whose screen it meets in its centre. Light at a place x
+/// from there goes the way t = −tilt·x / (1 + tilt·(divergence x)) to the screen, where it is at
+/// centre + by_mm (1 + t divergence) x.
 struct OnPicture {
-  Eigen::Vector2d centre;  ///< Pixel coordinates of the field's centre.
-  Eigen::Matrix2d by_mm;   ///< Their derivatives.
-  Eigen::Vector2i pixels;  ///< Columns and rows of the picture.
+  Eigen::Vector2d centre;          ///< Pixel coordinates of the field's centre.
+  Eigen::Matrix2d by_mm;           ///< Their derivatives, along the normal.
+  Eigen::Vector2i pixels;          ///< Columns and rows of the picture.
+  Eigen::Vector2d tilt{0.0, 0.0};  ///< Slopes of the plane against the screen.
 };
 
 /// Light of a rectangle of pixels.
@@ -91,7 +87,7 @@ class PlaneField {
   /// A ray on the plane.
   struct Vertex {
     Eigen::Vector2d place;   ///< mm
-    Eigen::Vector2d cosine;  ///< Derivative of its path by the place: laid ones' from the plan's.
+    Eigen::Vector2d cosine;  ///< Derivative of its path by the place.
     double path = 0.0;       ///< Optical, mm.
     double amplitude = 0.0;  ///< √(light per mm²)
   };
@@ -109,8 +105,8 @@ class PlaneField {
   void add(const std::array<Vertex, 3>& vertices);
   void lay_rest();
 
-  /// Goes to the other plane by the angular spectrum: nodes are then around far_centre(), their
-  /// distances magnified; their light stays what it was.
+  /// Goes to the other plane by the angular spectrum: the nodes' distances are then magnified;
+  /// their light stays what it was.
   void propagate();
 
   /// Adjoint of spread(): a field on the other plane becomes the derivative 2 ∂E/∂|U|² · U.
@@ -175,9 +171,8 @@ class PlaneField {
 
 /// A ray as its field has it: without the plan's phases, and moved along its own direction such
 /// that parabolic waves land where it lands, with its path. The canonical map of what the square
-/// root in the angular spectrum has beyond its parabola around the mean ray: as if rays were
-/// followed for some D |p − p0|² more before waves start.
-/// @param ray  its cosine as of the light.
+/// root in the angular spectrum has beyond its parabola: as if rays were followed for some
+/// 3/2 D |p|² more before waves start.
 PlaneField::Vertex laid_ray(const FieldPlan& plan, const PlaneField::Vertex& ray);
 
 /// A stretch of one axis of the grid, in cells, with a window that rises at its begin and falls at
@@ -292,11 +287,31 @@ struct WaveScene {
   std::optional<OutlineIndex> edge;  ///< Of a lens with an outline.
 };
 
+/// Axes of a tile: across and along its mean ray. On planes across it waves are parabolic: on
+/// planes z = const those of oblique rays have a third order in p, for which laid_ray() would
+/// follow rays 3 D |p0 p| before waves start, a fifth of the way behind a mirror lit at 30°.
+struct TileFrame {
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Columns: across, across, along.
+  double level = 0.0;  ///< Of the starting plane along the third, mm.
+
+  TileFrame() = default;
+  /// @param along  unit, z > 0.
+  explicit TileFrame(const Eigen::Vector3d& along) {
+    const Eigen::Vector3d x = Eigen::Vector3d::UnitX();
+    axes.col(0) = (x - along.x() * along).normalized();
+    axes.col(1) = along.cross(axes.col(0));
+    axes.col(2) = along;
+  }
+  /// A place on a plane across, in the lens's frame.
+  [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector2d& place, double along) const {
+    return axes.leftCols<2>() * place + along * axes.col(2);
+  }
+};
+
 /// How a tile's field is laid.
 struct TilePlan {
-  bool divided = false;                ///< Its quarters show it better.
-  double level = 0.0;                  ///< z of the starting plane, mm.
-  double far_level = 0.0;              ///< z of the plane on which the field ends, mm.
+  bool divided = false;  ///< Its quarters show it better.
+  TileFrame frame;
   Eigen::Vector2d steepest{0.0, 0.0};  ///< Directions of laid rays that go as waves.
   Eigen::Vector2d spread{0.0, 0.0};    ///< Directions to which they are scattered besides.
   bool limited = false;                ///< Steeper ones go as rays.
