@@ -23,6 +23,10 @@
 namespace lensforge::reflect {
 namespace {
 
+/// Faces thinner than this share of their longest side have cotangents as if they were not: one of
+/// 1e-16, as remeshing may leave, would hold the whole shape where it is.
+constexpr double kThinnest = 1e-3;
+
 /// A face's side.
 struct Side {
   int from;
@@ -77,9 +81,11 @@ EdgeTable make_edges(const SurfaceMesh& mesh) {
 }
 
 Eigen::Vector3d cotangents(const Corners& corners) {
-  const double twice_area = area_normal(corners).norm();
-  if (!(twice_area > 0.0)) return Eigen::Vector3d::Zero();
   const std::array p{corners.v0, corners.v1, corners.v2};
+  const double longest = std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm(),
+                                   (p[0] - p[2]).squaredNorm()});
+  const double twice_area = std::max(area_normal(corners).norm(), kThinnest * longest);
+  if (!(twice_area > 0.0)) return Eigen::Vector3d::Zero();
   Eigen::Vector3d cotangent;
   for (std::size_t k = 0; k < 3; ++k) {
     const Eigen::Vector3d& apex = p[(k + 2) % 3];

@@ -34,7 +34,7 @@ struct EdgeTable {
 EdgeTable make_edges(const SurfaceMesh& mesh);
 
 /// The cotangents of a triangle's angles, each for the opposite edge k (from corner k to k+1);
-/// zeros for a triangle without area.
+/// bounded for a triangle without area, zeros for one without sides.
 Eigen::Vector3d cotangents(const Corners& corners);
 
 /// Measures of a mesh's faces, a column each.

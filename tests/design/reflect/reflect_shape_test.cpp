@@ -119,6 +119,14 @@ TEST(ReflectShape, FacadesSendSunlightToPlacesAsThePaperDoes) {
   }
 }
 
+/// Remeshed to so many faces the fish has one of 1e-16 of the others' area.
+TEST(ReflectShape, AFaceWithoutAreaDoesNotHoldTheOthers) {
+  ReflectOptions options = quick();
+  options.faces = 2000;
+  const ReflectResult result = shaped(shapes::fish(), options);
+  EXPECT_LT(result.after.total, 0.5 * result.before.total);
+}
+
 TEST(ReflectShape, ATenthOfTheEnergyHasToBeGained) {
   EXPECT_TRUE(gained_enough(GoalKind::kStealth, 0.1, 0.05));
   EXPECT_FALSE(gained_enough(GoalKind::kDeflect, 0.1, 0.095));
