@@ -52,7 +52,7 @@ GridWindow wave_grid(const OpticalSetup& setup, const OpticalSurface& surface);
 /// the sum of its wavelengths'.
 ///
 /// The lens is divided into tiles with windows whose squares sum to 1. The rays of each are traced
-/// through its surface to a plane at its mean height, exactly; where they fold above the surface
+/// through its surface to a plane across its mean ray, exactly; where they fold above the surface
 /// every branch adds its field with its own optical path, and −π/2 beyond a fold. The field, of
 /// amplitude √(light per area), goes to the screen by the angular spectrum (Goodman, Introduction
 /// to Fourier Optics, section 3.10) without the phases of the mean ray and of the rays' common
