@@ -25,7 +25,6 @@ using lensforge::testing::picture_refusal;
 using lensforge::testing::TempFolder;
 using lensforge::testing::write_bytes;
 using ::testing::AnyOf;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -52,7 +51,8 @@ struct Pixels {
   std::vector<std::array<int, 3>> palette;
 
   [[nodiscard]] std::uint32_t at(int column, int row) const {
-    return values[static_cast<std::size_t>(row * columns + column)];
+    return values[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                  static_cast<std::size_t>(column)];
   }
 };
 

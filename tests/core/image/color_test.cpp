@@ -93,8 +93,6 @@ using OIIO::TypeDesc;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
 
 std::span<const unsigned char> bytes_of(const std::string& text) {
   return {reinterpret_cast<const unsigned char*>(text.data()), text.size()};
@@ -134,8 +132,9 @@ TEST(ColorProfile, ALinearProfileOfRec709sPrimariesIsTheirLuminance) {
 std::array<double, 3> luminances(const std::array<double, 6>& xy) {
   Eigen::Matrix3d primaries;
   for (int c = 0; c < 3; ++c) {
-    const double x = xy[static_cast<std::size_t>(2 * c)];
-    const double y = xy[static_cast<std::size_t>(2 * c + 1)];
+    const std::size_t at = 2 * static_cast<std::size_t>(c);
+    const double x = xy[at];
+    const double y = xy[at + 1];
     primaries.col(c) << x / y, 1.0, (1.0 - x - y) / y;
   }
   const Eigen::Vector3d white(0.3127 / 0.3290, 1.0, (1.0 - 0.3127 - 0.3290) / 0.3290);
