@@ -235,7 +235,8 @@ Image drawn(int columns, int rows, const Inside& inside) {
     for (int c = 0; c < columns; ++c) {
       int covered = 0;
       for (int k = 0; k < kParts * kParts; ++k) {
-        covered += inside(c + (k % kParts + 0.5) / kParts, r + (k / kParts + 0.5) / kParts);
+        const int row = k / kParts;
+        covered += inside(c + (k % kParts + 0.5) / kParts, r + (row + 0.5) / kParts);
       }
       image.at(c, r) = static_cast<float>(decode(static_cast<double>(covered) / (kParts * kParts)));
     }
@@ -267,7 +268,8 @@ TEST(OutlineContour, ShapeIsSeenFromTheCuttersSide) {
   const OutlineIndex index(outline);
   int inside = 0;
   for (int k = 0; k < 10000; ++k) {
-    const Eigen::Vector2d p(kSize.x() * (k % 100 + 0.5) / 100, kSize.y() * (k / 100 + 0.5) / 100);
+    const int row = k / 100;
+    const Eigen::Vector2d p(kSize.x() * (k % 100 + 0.5) / 100, kSize.y() * (row + 0.5) / 100);
     if (!index.contains(p)) continue;
     mean_x += p.x();
     mean_y += p.y();

@@ -19,8 +19,6 @@
 namespace lensforge::testing {
 namespace {
 
-using ::testing::HasSubstr;
-
 const Eigen::Vector2d kSize(30.0, 24.0);
 
 /// Convex and hollow, hardly larger than the lens, usual, and almost flat; the apex aside.
@@ -39,7 +37,8 @@ double volume_by_midpoints(const Front& front, const Eigen::AlignedBox2d& box, i
   const Eigen::Vector2d cell = box.sizes() / cells;
   double sum = 0.0;
   for (int k = 0; k < cells * cells; ++k) {
-    const Eigen::Vector2d share(k % cells + 0.5, k / cells + 0.5);
+    const int row = k / cells;
+    const Eigen::Vector2d share(k % cells + 0.5, row + 0.5);
     sum += surface.height(box.min() + cell.cwiseProduct(share));
   }
   return sum * cell.prod();

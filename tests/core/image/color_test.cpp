@@ -201,9 +201,9 @@ TEST(ColorProfile, GreyAndDeepPicturesGoByTheirProfiles) {
 
 TEST(ColorProfile, AProfileOfSrgbChangesNoBit) {
   const OIIO::ImageSpec spec(256, 1, 3, TypeDesc::UINT8);
-  std::vector<float> stored;
+  std::vector<float> stored(256 * 3);
   std::mt19937 random(6);
-  for (int i = 0; i < 256 * 3; ++i) stored.push_back(static_cast<float>(random() % 256) / 255.0F);
+  for (float& value : stored) value = static_cast<float>(random() % 256) / 255.0F;
   const LoadedImage plain = read_with("", ".png", spec, stored);
   const LoadedImage with = read_with(srgb_profile(), ".png", spec, stored);
   EXPECT_EQ(with.image, plain.image);

@@ -45,7 +45,7 @@ inline std::string rgb_profile(double gamma, const std::array<double, 6>& xy) {
   const cmsCIExyYTRIPLE primaries{{xy[0], xy[1], 1.0}, {xy[2], xy[3], 1.0}, {xy[4], xy[5], 1.0}};
   cmsToneCurve* const curve = cmsBuildGamma(nullptr, gamma);
   const std::array<cmsToneCurve*, 3> curves{curve, curve, curve};
-  const std::string bytes = saved_profile(cmsCreateRGBProfile(&white, &primaries, curves.data()));
+  std::string bytes = saved_profile(cmsCreateRGBProfile(&white, &primaries, curves.data()));
   cmsFreeToneCurve(curve);
   return bytes;
 }
@@ -53,7 +53,7 @@ inline std::string rgb_profile(double gamma, const std::array<double, 6>& xy) {
 inline std::string grey_profile(double gamma) {
   const cmsCIExyY white{0.3127, 0.3290, 1.0};
   cmsToneCurve* const curve = cmsBuildGamma(nullptr, gamma);
-  const std::string bytes = saved_profile(cmsCreateGrayProfile(&white, curve));
+  std::string bytes = saved_profile(cmsCreateGrayProfile(&white, curve));
   cmsFreeToneCurve(curve);
   return bytes;
 }
