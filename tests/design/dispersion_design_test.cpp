@@ -20,8 +20,6 @@
 namespace lensforge {
 namespace {
 
-using testing::Random;
-
 /// The test lens of a material that spreads colours strongly, in light of three of them.
 OpticalSetup colored_setup() {
   OpticalSetup setup = testing::kSetup;

@@ -61,7 +61,7 @@ long double shared(const std::vector<Long>& one, const std::vector<Long>& other)
       const long double at_p = turn(side, p - a);
       const long double at_q = turn(side, q - a);
       if (at_p >= 0.0L) kept.push_back(p);
-      if (at_p * at_q < 0.0L) kept.push_back(p + (q - p) * (at_p / (at_p - at_q)));
+      if (at_p * at_q < 0.0L) kept.emplace_back(p + (q - p) * (at_p / (at_p - at_q)));
     }
     part = kept;
   }
@@ -76,7 +76,7 @@ long double shared(const std::vector<Long>& one, const std::vector<Long>& other)
 double shared_area(const Outline& outline, const PlanTriangle& t) {
   const Long from(-100.0L, -77.0L);
   std::vector<Long> triangle;
-  for (const Eigen::Vector2d& p : t) triangle.push_back(p.cast<long double>());
+  for (const Eigen::Vector2d& p : t) triangle.emplace_back(p.cast<long double>());
   long double area = 0.0L;
   for (std::size_t k = 0; k < outline.points.size(); ++k) {
     const Long a = outline.points[k].cast<long double>();

@@ -252,7 +252,9 @@ TEST_F(Journals, AreRegularFilesOnly) {
 }
 
 TEST_F(Journals, AreReadInConstantMemory) {
-  write_bytes(path(), journal_of({}) + std::string(50'000'000, 'x'));
+  std::string torn;
+  torn.resize(50'000'000, 'x');
+  write_bytes(path(), journal_of({}) + torn);
   EXPECT_EQ(read_journal(path()).torn, 50'000'000);
 }
 

@@ -100,7 +100,7 @@ TEST_F(ProgramFiles, FeedNoLineThatWasNotChecked) {
   ProgramFeed feed(*in, {grbl_dialect(), false, {}, 1, 0, {}});
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(feed.next());
   std::string changed = program_;
-  for (std::size_t at = 0; (at = changed.find("X", at)) != std::string::npos;) changed[at] = 'Z';
+  for (std::size_t at = 0; (at = changed.find('X', at)) != std::string::npos;) changed[at] = 'Z';
   write_bytes(path(), changed);
   EXPECT_THROW(
       {
