@@ -82,8 +82,8 @@ EdgeTable make_edges(const SurfaceMesh& mesh) {
 
 Eigen::Vector3d cotangents(const Corners& corners) {
   const std::array p{corners.v0, corners.v1, corners.v2};
-  const double longest = std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm(),
-                                   (p[0] - p[2]).squaredNorm()});
+  const double longest = std::max(
+      {(p[1] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm(), (p[0] - p[2]).squaredNorm()});
   const double twice_area = std::max(area_normal(corners).norm(), kThinnest * longest);
   if (!(twice_area > 0.0)) return Eigen::Vector3d::Zero();
   Eigen::Vector3d cotangent;
