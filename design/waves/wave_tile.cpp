@@ -563,15 +563,10 @@ class WaveTile {
     Eigen::Matrix2d by_mm;
     by_mm << lands(field.centre + Eigen::Vector2d::UnitX(), far) - at,
         lands(field.centre + Eigen::Vector2d::UnitY(), far) - at;
-    const Screen& screen = color_.screen;
-    const Eigen::Vector3d from = screen.at(at);
+    const OpticalSetup& setup = color_.setup;
     const Eigen::Vector3d normal =
-        plan_.frame.axes.transpose() * (screen.at(at + Eigen::Vector2d::UnitX()) - from)
-                                           .cross(screen.at(at + Eigen::Vector2d::UnitY()) - from);
-    return {at,
-            by_mm,
-            {screen.plane().columns(), screen.plane().rows()},
-            normal.head<2>() / normal.z()};
+        plan_.frame.axes.transpose() * setup.screen_x.cross(setup.screen_y);
+    return {at, by_mm, setup.pixels, normal.head<2>() / normal.z()};
   }
 
   const WaveColor& color_;
