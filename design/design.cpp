@@ -252,6 +252,10 @@ constexpr double kBaseMemory = 1.6e8;
 /// 9.5 s for three).
 constexpr double kColorShare = 0.35;
 
+/// Iterations of a round after which a picture is usually good enough (Finish), in iterations that
+/// --quality allows.
+constexpr double kUsualIterations = 60.0;
+
 /// Pictures by waves that an iteration takes: one, with its adjoint that of 1.3 more, and a seventh
 /// more evaluations than iterations.
 constexpr double kWavesPerIteration = 2.6;
@@ -263,6 +267,11 @@ double iteration_seconds(const Level& level, const DesignOptions& options) {
   const double growth = 1.0 + kColorShare * (static_cast<double>(colors) - 1.0);
   if (!level.spline) return growth * kIterationSeconds;
   return growth * (options.made_by ? kMadeSeconds : kSplineSeconds);
+}
+
+/// Share of the iterations that a design makes, about.
+double usual_share(const DesignOptions& options) {
+  return options.ends_when_seen() ? std::min(1.0, kUsualIterations / options.iterations) : 1.0;
 }
 
 /// Sites of a level's transports: those of the even mesh, for facets also their own.
@@ -285,7 +294,8 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
     double memory = kSplineMemory * triangles;
     const double whole = share < 1.0 ? kWholeMemory : 0.0;
     if (options.rendering_guided && !level.waves) {
-      processor += triangles * iteration_seconds(level, options) * iterations;
+      processor +=
+          triangles * iteration_seconds(level, options) * usual_share(options) * iterations;
     }
     if (level.waves) {
       const OpticalSetup setup = optical_setup(options, level.pixels);

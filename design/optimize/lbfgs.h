@@ -287,9 +287,10 @@ using RawObjective = std::function<double(std::span<const double> x, std::span<d
 using RawPreconditioner = std::function<void(std::span<const double> g, std::span<double> r)>;
 
 /// Limited-memory BFGS (Liu & Nocedal 1989) with a preconditioner as initial matrix and a line
-/// search that meets the weak Wolfe conditions by bisection (Lewis & Overton 2013), stepping back
-/// where the value is infinite. All vectors stay in the executor's memory; only scalar products
-/// leave it. Sums have a fixed order, so the result does not depend on the thread count.
+/// search that meets the weak Wolfe conditions by bisection (Lewis & Overton 2013), after steps
+/// back by a parabola, or where the value is infinite. All vectors stay in the executor's memory;
+/// only scalar products leave it. Sums have a fixed order, so the result does not depend on the
+/// thread count.
 template <class Exec>
 class LbfgsOn {
  public:
@@ -333,6 +334,11 @@ class LbfgsOn {
   /// Evaluations per step after which a lower value is accepted without the curvature condition.
   static constexpr int kEnoughEvaluations = 4;
 
+  /// Factors on a step that was too long: on one that is not allowed, minimum and maximum.
+  static constexpr double kShorterIfRefused = 0.25;
+  static constexpr double kShortest = 0.05;
+  static constexpr double kLongest = 0.5;
+
   template <class Functor>
   void each_entry(const char* kernel, const Functor& functor) const {
     parallel_for(executor_, kernel, static_cast<std::int64_t>(current_.x.size()), functor,
@@ -353,6 +359,7 @@ class LbfgsOn {
   void find_direction();
   int search(double slope, bool& decreased);
   void remember();
+  [[nodiscard]] double shortened(double step, double slope, double value) const;
   [[nodiscard]] bool stalled(const std::vector<double>& values) const;
 
   RawObjective objective_;
@@ -397,6 +404,16 @@ void LbfgsOn<Exec>::remember() {
   scale_ = curvature / product(change, preconditioned);
 }
 
+/// A step shorter than one that was too long: to the minimum of the parabola through the values at
+/// both its ends and the slope at the first, within a twentieth and a half of it. The first step,
+/// by steepest descent, may be a hundred times too long.
+template <class Exec>
+double LbfgsOn<Exec>::shortened(double step, double slope, double value) const {
+  if (!std::isfinite(value)) return kShorterIfRefused * step;
+  const double bend = value - current_.value - step * slope;
+  return std::clamp(-0.5 * step * slope / bend, kShortest, kLongest) * step;
+}
+
 /// The weak Wolfe line search along direction_ from current_; next_ receives the accepted point.
 /// @return number of points looked at; `decreased` is true if one of sufficient decrease was found.
 template <class Exec>
@@ -408,6 +425,7 @@ int LbfgsOn<Exec>::search(double slope, bool& decreased) {
   for (int evaluations = 0; evaluations < options_.max_evaluations_per_step;) {
     each_entry("step", StepEntry{current_.x.data(), step, direction_.data(), trial_.x.data()});
     evaluate(trial_);
+    const double tried = trial_.value;
     ++evaluations;
     if (!(trial_.value <= current_.value + options_.armijo * step * slope)) {
       high = step;
@@ -425,7 +443,11 @@ int LbfgsOn<Exec>::search(double slope, bool& decreased) {
       slope = product(direction_, current_.gradient);
       if (!(slope < 0.0)) return evaluations;
     }
-    step = std::isinf(high) ? 2.0 * step : 0.5 * (low + high);
+    if (std::isinf(high)) {
+      step *= 2.0;
+    } else {
+      step = low == 0.0 ? shortened(high, slope, tried) : 0.5 * (low + high);
+    }
   }
   return options_.max_evaluations_per_step;
 }

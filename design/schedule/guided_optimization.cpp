@@ -45,8 +45,10 @@ constexpr double kShiftPower = 1.0;
 constexpr double kHeightSizePower = 0.5;
 constexpr double kShiftSizePower = 1.5;
 
-/// Number of probes of the curvature that is levelled; more bring nothing.
-constexpr std::uint64_t kLevellingProbes = 4;
+/// Number of probes of the curvature that is levelled. MAE in thousandths of a photograph with deep
+/// blacks, the portrait and the logo, 128², after 60 iterations of the mesh and 20 of the spline,
+/// with 0, 1 and 4: 4.1, 2.7 and 2.7; 2.1, 1.5 and 1.6; 5.7, 4.7 and 4.6. One takes two pictures.
+constexpr std::uint64_t kLevellingProbes = 1;
 
 /// Minimum triangle area of a mesh, as a share of the mean, by default_area_barrier(); the control
 /// points of a spline may overlap where the spline does not.

@@ -88,6 +88,10 @@ constexpr double kMergedIterations = 0.8;
 constexpr int kWaveRound = 20;
 constexpr double kWaveIterations = 0.4;
 
+/// MAE with which a mesh is good enough to start a spline from, or a finer level, in goals of the
+/// design (Finish::goal()).
+constexpr double kEnoughToStart = 1.4;
+
 /// Factor on WaveOptions::overlap: an optimiser puts light where the edges of tiles leave it out.
 constexpr double kMoreOverlap = 1.5;
 
@@ -96,6 +100,22 @@ void merge_rounds(int merged, double share, Level& level) {
   const double iterations = share * level.rounds * level.iterations;
   level.rounds = (level.rounds + merged - 1) / merged;
   level.iterations = rounded(iterations / level.rounds, 1);
+}
+
+/// True if n has no prime factor above 7.
+bool has_small_factors(int n) {
+  for (const int factor : {2, 3, 5, 7}) {
+    while (n % factor == 0) n /= factor;
+  }
+  return n == 1;
+}
+
+/// Control points along a side of so many knot cells, or a few less: the cosine transforms of the
+/// preconditioner, of one point less, take twice as long where that has a large prime factor.
+int spline_points(double cells) {
+  int points = rounded(cells, 1) + 3;
+  while (!has_small_factors(points - 1)) --points;
+  return points;
 }
 
 Level spline_level(const Level& mesh, const Eigen::Vector2d& size, const DesignOptions& options) {
@@ -116,7 +136,7 @@ Level spline_level(const Level& mesh, const Eigen::Vector2d& size, const DesignO
       level.least_area = kFineLeastArea;
     }
   }
-  level.grid = {rounded(size.x() / cell, 1) + 3, rounded(size.y() / cell, 1) + 3};
+  level.grid = {spline_points(size.x() / cell), spline_points(size.y() / cell)};
   return level;
 }
 
@@ -209,9 +229,14 @@ DesignTask make_task(const Image& target, const DesignOptions& options, const Ex
                   std::move(working),
                   optical_setup(options, pixels),
                   plan_levels(pixels, options),
-                  std::nullopt};
+                  std::nullopt,
+                  {}};
   if (!task.setup.extent.none()) {
     task.limit = source_limit(task.target, task.setup, options.thickness, task.executor);
+  }
+  if (options.ends_when_seen()) {
+    const double wavelength = wave_options(options, task.setup).wavelength;
+    task.finish = Finish(picture_floor(task.target, task.setup, options.thickness, wavelength));
   }
   return task;
 }
@@ -227,10 +252,13 @@ LevelProblem make_problem(const DesignTask& task, const Level& level, std::int64
   problem.objective.model = task.options.model;
   problem.objective.nu = level.nu;
   problem.objective.surface_height = task.options.thickness;
+  const bool starts = !level.spline && &level != &task.levels.back();
+  problem.enough = (starts ? kEnoughToStart : 1.0) * task.finish.goal();
   if (level.waves) {
     problem.objective.waves = wave_options(task.options, task.setup);
     problem.objective.waves->overlap *= kMoreOverlap;
     problem.aim = problem.target;
+    problem.enough = 0.0;
   }
   if (level.spline) {
     // A spline is smooth by itself; barriers act on the triangles between its nodes.

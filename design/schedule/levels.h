@@ -13,6 +13,7 @@
 #include "core/spline/control_net.h"
 #include "design/energy/objective_options.h"
 #include "design/render/source_picture.h"
+#include "design/schedule/finish.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/setup/design_options.h"
 
@@ -66,6 +67,7 @@ struct DesignTask {
   OpticalSetup setup;
   std::vector<Level> levels;
   std::optional<SourceLimit> limit;  ///< Set for an extended source.
+  Finish finish;
 };
 
 /// Returns the picture at the size that the options ask for. @throw Interrupted
@@ -81,7 +83,8 @@ DesignTask make_task(const Image& target, const DesignOptions& options, const Ex
 struct LevelProblem {
   OpticalSetup setup;
   Image target;
-  Image aim;  ///< Goal of transport; an extended source blurs it to `target`.
+  Image aim;            ///< Goal of transport; an extended source blurs it to `target`.
+  double enough = 0.0;  ///< MAE at which the level is done.
   ObjectiveOptions objective;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -62,9 +63,11 @@ double black_share(const Image& picture) {
 }
 
 /// An even mesh of the same proportions, fine enough for the transport that shapes the mesh.
-SurfaceMesh coarse_mesh(const DesignTask& task, GridShape shape) {
+SurfaceMesh coarse_mesh(const DesignTask& task, const LevelProblem& problem, GridShape shape) {
   const auto faces = [&] { return 2.0 * (shape.columns - 1) * (shape.rows - 1); };
-  while (faces() > kMaxEvenFaces) {
+  const bool dark =
+      task.options.model != SurfaceModel::kFacet && black_share(problem.aim) > kMaxBlack;
+  while (faces() > (dark ? kMaxDarkFaces : kMaxEvenFaces)) {
     shape = {(shape.columns - 1) / 2 + 1, (shape.rows - 1) / 2 + 1};
   }
   return start_surface(task.setup, shape, task.options.thickness, task.executor);
@@ -174,7 +177,7 @@ std::optional<AimedMesh> transport_step(const DesignTask& task, const LevelProbl
                                         DesignLog& log) {
   const StepSite site{task, problem, log};
   const bool shapes = shaping != MeshShaping::kNone;
-  const SurfaceMesh even = shapes ? coarse_mesh(task, mesh.grid) : mesh;
+  const SurfaceMesh even = shapes ? coarse_mesh(task, problem, mesh.grid) : mesh;
   Matching matching = match_all(site, even);
   if (matching.result.centroids.cols() == 0) return std::nullopt;
   if (!matching.result.converged()) log.ended_early("transport", matching.result.message);
@@ -263,22 +266,59 @@ void start_from_transport(const LevelSite& site, Checkpoint& state) {
                                           : "it found no place for the light");
 }
 
+/// The log of a round's iterations, which ends them when the picture is good enough.
+class Watch {
+ public:
+  explicit Watch(const LevelSite& site)
+      : site_(site),
+        log_(site.log.observer(site.level.waves    ? "waves"
+                               : site.level.spline ? "spline"
+                                                   : "render")) {}
+
+  bool operator()(int iteration, const ObjectiveEvaluation& step) {
+    reached_ = step.energy.total;
+    errors_.push_back(step.mae);
+    if (!log_(iteration, step)) return false;
+    const bool good = step.mae <= site_.problem.enough;
+    // An extended source is approximated, and the next round measures by how much.
+    enough_ = good && (site_.problem.setup.extent.none() || iteration == 1);
+    over_ = good || idle();
+    return !over_;
+  }
+
+  [[nodiscard]] double reached() const { return reached_; }  ///< Objective of the last step.
+  [[nodiscard]] bool over() const { return over_; }          ///< It has ended the round,
+  [[nodiscard]] bool enough() const { return enough_; }      ///< and the level.
+
+ private:
+  /// Rounds of facets lead new ones to unlit pixels, and those by waves have a rule of their own.
+  [[nodiscard]] bool idle() const {
+    const bool facets = site_.problem.objective.model == SurfaceModel::kFacet;
+    return !facets && !site_.level.waves && site_.task.finish.idle(errors_);
+  }
+
+  const LevelSite& site_;
+  GuidedOptimization::Observer log_;
+  std::vector<double> errors_;
+  double reached_ = kInfinity;
+  bool over_ = false;
+  bool enough_ = false;
+};
+
 /// The rendering-guided half. @return false if it was asked to stop.
-bool follow_picture(const LevelSite& site, const GuidedOptimization::Observer& observe,
-                    Checkpoint& state) {
+bool follow_picture(const LevelSite& site, Watch& watch, Checkpoint& state) {
   LbfgsOptions optimizer;
   optimizer.max_iterations = site.level.iterations;
   optimizer.history = kHistory;
-  const LbfgsSummary summary = site.stage.run(optimizer, observe, state.scales, state.mesh,
+  const LbfgsSummary summary = site.stage.run(optimizer, std::ref(watch), state.scales, state.mesh,
                                               site.log.step("starting iterations"));
   using Status = LbfgsSummary::Status;
   if (summary.status == Status::kInfeasibleStart) refuse_start(site.task);
-  return summary.status != Status::kStopped;
+  return summary.status != Status::kStopped || watch.over();
 }
 
 /// Runs both halves and conclude_round(). @return false if it was asked to stop.
-bool alternate(const LevelSite& site, const SurfaceMesh& before,
-               const GuidedOptimization::Observer& observe, Checkpoint& state) {
+bool alternate(const LevelSite& site, const SurfaceMesh& before, Watch& watch, Checkpoint& state) {
   const DesignOptions& options = site.task.options;
   const bool transports =
       !site.level.spline && state.transporting && state.round < options.transport_rounds;
@@ -286,9 +326,9 @@ bool alternate(const LevelSite& site, const SurfaceMesh& before,
   if (!site.level.spline && !relax(site, 2, state.mesh)) relax(site, 3, state.mesh);
   // Steps for waves are not measured anew: an idle round by waves is the last.
   const bool rescaled = !state.scales.known() || site.level.waves;
-  if (options.rendering_guided && !follow_picture(site, observe, state)) return false;
+  if (options.rendering_guided && !follow_picture(site, watch, state)) return false;
   const double idle = site.level.waves ? kIdleWaves : kIdleRound;
-  conclude_round({before, site.stage.value(state.mesh), transports, rescaled, idle},
+  conclude_round({before, site.stage.value(state.mesh), transports, rescaled, watch.enough(), idle},
                  site.level.rounds, state);
   return true;
 }
@@ -297,20 +337,13 @@ bool alternate(const LevelSite& site, const SurfaceMesh& before,
 
 bool run_round(const LevelSite& site, Checkpoint& state) {
   const SurfaceMesh before = state.mesh;
-  double reached = kInfinity;  // Objective of the last step.
-  const GuidedOptimization::Observer log = site.log.observer(site.level.waves    ? "waves"
-                                                             : site.level.spline ? "spline"
-                                                                                 : "render");
-  const auto observe = [&](int iteration, const ObjectiveEvaluation& step) {
-    reached = step.energy.total;
-    return log(iteration, step);
-  };
+  Watch watch(site);
   // A newly aimed mesh is often worse than the one before until it is optimised.
   const auto keep_the_better = [&] {
-    if (!(reached <= state.value)) state.mesh = before;
+    if (!(watch.reached() <= state.value)) state.mesh = before;
   };
   try {
-    const bool finished = alternate(site, before, observe, state);
+    const bool finished = alternate(site, before, watch, state);
     if (!finished) keep_the_better();
     return finished;
   } catch (const Interrupted&) {
@@ -331,7 +364,7 @@ void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state) 
     state.scales = {};
   }
   const bool exhausted = idle && outcome.rescaled && !outcome.transported;
-  state.round = exhausted ? rounds : state.round + 1;
+  state.round = exhausted || outcome.enough ? rounds : state.round + 1;
 }
 
 namespace {

@@ -120,8 +120,8 @@ TEST(LevelPlan, ASplineFollowsFewerRoundsOfTheMesh) {
   EXPECT_TRUE(levels[1].spline);
   EXPECT_EQ(levels[1].rounds, 2);
   EXPECT_EQ(levels[1].iterations, 36);
-  // Two knot cells each way per cell, 160 cells across.
-  EXPECT_EQ(levels[1].grid, (GridShape{323, 163}));
+  // Two knot cells each way per cell, 160 cells across; 322 has the factor 23.
+  EXPECT_EQ(levels[1].grid, (GridShape{321, 163}));
 }
 
 TEST(LevelPlan, PicturesOfAnExtendedLampAreCorrectedInTwiceTheRounds) {
@@ -179,7 +179,9 @@ TEST(LevelPlan, ASplineFitsASolidsFile) {
   options.model = SurfaceModel::kSpline;
   for (const Eigen::Vector2i& size : {Eigen::Vector2i(512, 512), Eigen::Vector2i(2048, 300)}) {
     const GridShape grid = plan_levels(size, options).back().grid;
-    EXPECT_NEAR((grid.columns - 3.0) * (grid.rows - 3.0), kMaxKnotCells, 0.01 * kMaxKnotCells);
+    const double cells = (grid.columns - 3.0) * (grid.rows - 3.0);
+    EXPECT_LE(cells, 1.001 * kMaxKnotCells);
+    EXPECT_GT(cells, 0.95 * kMaxKnotCells);
   }
 }
 
@@ -342,7 +344,7 @@ double least_area(const SurfaceMesh& mesh) {
 
 TEST(LevelStart, HasNoFoldedAndNoTinyTriangleForAnyPicture) {
   int folded = 0;
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 18; ++seed) {
     SCOPED_TRACE(seed);
     testing::Random random(seed);
     const int rows = 40 + random.below(8);
