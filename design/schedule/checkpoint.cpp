@@ -252,6 +252,10 @@ void DesignLog::ended_early(const std::string& step, const std::string& why) {
       "; " + step + " of round " + std::to_string(state_.round + 1) + " ended early (" + why + ")";
 }
 
+void DesignLog::good_enough() {
+  remark_ = ", the wall shows no more (--quality paper goes on)";
+}
+
 void DesignLog::report_step(const std::string& what) const {
   if (task_.options.resume && !iterated_) {
     task_.control.report({stage_name(task_, state_), 0.0, 0.0, what});

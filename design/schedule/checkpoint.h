@@ -75,6 +75,8 @@ class DesignLog {
 
   /// Records that a step of this round ended early, as a remark to the user.
   void ended_early(const std::string& step, const std::string& why);
+  /// The same of the whole design: its picture is good enough.
+  void good_enough();
   /// The last remark, to be appended to a message; empty if there is none.
   [[nodiscard]] const std::string& remark() const { return remark_; }
 

@@ -26,8 +26,8 @@ constexpr double kDiscSigma = 0.25;
 /// Of a blur, pixels: more leaves nothing of a picture anyway.
 constexpr double kMaxSigma = 32.0;
 
-/// Largest error of values that are rounded to the 255 steps of a display.
-constexpr double kDisplayFloor = 0.5 / 255.0;
+/// Mean error of values that are rounded to the 255 steps of a display.
+constexpr double kDisplayFloor = 0.25 / 255.0;
 
 /// Share of the floor by which the wall's error may be above it, and largest goal: most pixels are
 /// then within one step of a display.

@@ -327,6 +327,7 @@ bool alternate(const LevelSite& site, const SurfaceMesh& before, Watch& watch, C
   // Steps for waves are not measured anew: an idle round by waves is the last.
   const bool rescaled = !state.scales.known() || site.level.waves;
   if (options.rendering_guided && !follow_picture(site, watch, state)) return false;
+  if (watch.enough() && &site.level == &site.task.levels.back()) site.log.good_enough();
   const double idle = site.level.waves ? kIdleWaves : kIdleRound;
   conclude_round({before, site.stage.value(state.mesh), transports, rescaled, watch.enough(), idle},
                  site.level.rounds, state);

@@ -55,6 +55,20 @@ double quadratic(const Eigen::VectorXd& x, Eigen::VectorXd& g) {
   return 0.5 * g.dot(x - Eigen::VectorXd::Ones(kUnknowns));
 }
 
+/// Steepest descent that is a thousand times too long.
+TEST(Lbfgs, ShortensAFirstStepInFewEvaluations) {
+  const Objective bowl = [](const Eigen::VectorXd& x, Eigen::VectorXd& g) {
+    g = 2000.0 * x;
+    return 1000.0 * x.squaredNorm();
+  };
+  LbfgsOptions options = thorough();
+  options.max_iterations = 1;
+  Eigen::VectorXd x = Eigen::Vector2d(1.0, -2.0);
+  const LbfgsSummary summary = minimize(bowl, options, x);
+  EXPECT_LE(summary.evaluations, 6);  // Halving takes eleven.
+  EXPECT_LT(summary.value, 0.1 * summary.initial_value);
+}
+
 TEST(Lbfgs, FindsTheMinimumOfRosenbrocksValley) {
   Eigen::VectorXd x = Eigen::Vector2d(-1.2, 1.0);
   const LbfgsSummary summary = minimize(rosenbrock, thorough(), x);

@@ -17,7 +17,7 @@ namespace lensforge {
 namespace {
 
 constexpr double kWavelength = 550e-6;
-constexpr double kDisplayFloor = 0.5 / 255.0;
+constexpr double kDisplayFloor = 0.25 / 255.0;
 
 /// A wall on which diffraction is 1.04 pixels wide: σ of its blur is 0.2 of that.
 OpticalSetup sharp_wall(int pixels) {
