@@ -294,12 +294,23 @@ void require_faces(const RepairedMesh& repaired, const std::string& name) {
   refuse(name, "no face has an area: one at least must; look at it in a mesh editor");
 }
 
-void require_manifold(const EdgeTable& table, const std::string& name) {
+/// Separates surfaces at edges with more than two faces, or refuses them.
+void settle_crowded_edges(RepairedMesh& repaired, const std::string& name, bool separate) {
+  const EdgeTable table = make_edges(repaired.mesh);
   if (table.crowded < 0) return;
+  if (separate) {
+    repaired.mesh = separated(quartered(repaired.mesh));
+    repaired.changes.emplace_back("surfaces separated at edges with more than two faces");
+    return;
+  }
   const Edge& edge = table.edges[static_cast<std::size_t>(table.crowded)];
-  refuse(name, "the edge of vertices " + std::to_string(edge.from) + " and " +
-                   std::to_string(edge.to) +
-                   " has more than two faces: must have one or two; make the mesh a manifold");
+  const auto at = [&](int v) {
+    const Eigen::Vector3d p = repaired.mesh.vertices.col(v);
+    return number_text(p.x()) + "," + number_text(p.y()) + "," + number_text(p.z());
+  };
+  refuse(name, "the edge from " + at(edge.from) + " to " + at(edge.to) +
+                   " has more than two faces: must have one or two; --faces N separates the "
+                   "surfaces there and remeshes them");
 }
 
 /// Walks over every piece of the mesh and turns its faces so that they agree.
@@ -403,13 +414,13 @@ class Orientation {
 
 }  // namespace
 
-RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name) {
+RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name, bool separate) {
   RepairedMesh result;
   require_size(mesh, name);
   merge_vertices(mesh, result);
   require_faces(result, name);
+  settle_crowded_edges(result, name, separate);
   const EdgeTable table = make_edges(result.mesh);
-  require_manifold(table, name);
   result.closed = table.is_closed();
   const std::int64_t turned = Orientation(result.mesh, table, name).settle();
   if (turned > 0) result.changes.push_back(counted(turned, "face turned", "faces turned"));
@@ -545,7 +556,7 @@ std::vector<std::vector<int>> planar_groups(const ReflectOptions& options, std::
 ReflectInput prepared_input(const SurfaceMesh& mesh, const std::string& name,
                             const ReflectOptions& options) {
   require_no_numbers(options);
-  const RepairedMesh repaired = repair_mesh(mesh, name);
+  const RepairedMesh repaired = repair_mesh(mesh, name, options.faces > 0);
   ReflectInput input{repaired.mesh, repaired.closed, repaired.changes, {}, {}, {}};
   require_closed(options, name, input.closed);
   if (options.faces > 0) {

@@ -83,18 +83,21 @@ void validate(const ReflectOptions& options);
 struct RepairedMesh {
   SurfaceMesh mesh;
   std::vector<std::string> changes;  ///< For example "12 duplicate vertices merged".
-  std::vector<int> vertex;           ///< New number of every vertex; −1 if it was dropped.
-  std::vector<int> face;             ///< Original face of every face.
+  /// New number of every vertex; −1 if it was dropped. Not of a mesh that was separated.
+  std::vector<int> vertex;
+  std::vector<int> face;  ///< Original face of every face. Not of a mesh that was separated.
   bool closed = false;
 };
 
 /// Merges vertices in the same place, removes faces without area and vertices without a face, and
 /// turns faces that disagree with their neighbours; the faces of a closed piece then look outwards.
 /// @param name  of the file, for messages.
+/// @param separate  separate surfaces at edges with more than two faces; faces are then cut in
+/// four.
 /// @throw InputError naming the face or edge: no face with an area, an edge with more than two
-///        faces, a piece with one side only (a Möbius strip), coordinates so large or small that
-///        areas vanish.
-RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name);
+///        faces unless `separate`, a piece with one side only (a Möbius strip), coordinates so
+///        large or small that areas vanish.
+RepairedMesh repair_mesh(const SurfaceMesh& mesh, const std::string& name, bool separate = false);
 
 /// A mesh that is ready to be deformed, with the parts that stay as they are.
 struct ReflectInput {

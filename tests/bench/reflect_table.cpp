@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The reflector stage on the drawn shapes, as Markdown tables: both methods at equal displacement,
-// the figures of Tojo et al., and what silhouettes add to gradients by normals.
+// The reflector stage on the drawn shapes, as Markdown tables: descents at several numbers of
+// faces, both methods at equal displacement, the figures of Tojo et al., and what silhouettes add
+// to gradients by normals.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,7 @@
 #include "bench/markdown_table.h"
 #include "bench/reflect_figures.h"
 #include "core/text/number_text.h"
+#include "design/reflect/mesh/faces.h"
 #include "design/reflect/reflect_shape.h"
 #include "fixtures/shapes/shapes.h"
 
@@ -34,11 +36,17 @@ struct Settings {
   std::vector<std::string> shapes;
   std::vector<double> anchors{0.03};
   std::vector<std::string> figures = figure_names();
+  std::vector<int> sizes{400, 1000, 2000, 5000, 10000};
   int faces = 400;
   int updates = 30;
   int threads = 2;
   std::string plots;
 };
+
+bool is_wanted(const Settings& settings, const shapes::NamedShape& shape) {
+  const auto found = std::find(settings.shapes.begin(), settings.shapes.end(), shape.name);
+  return settings.shapes.empty() || found != settings.shapes.end();
+}
 
 class MethodTable {
  public:
@@ -47,8 +55,7 @@ class MethodTable {
 
   std::string text() {
     for (const shapes::NamedShape& shape : shapes::drawn_shapes()) {
-      const auto wanted = std::find(settings_.shapes.begin(), settings_.shapes.end(), shape.name);
-      if (!settings_.shapes.empty() && wanted == settings_.shapes.end()) continue;
+      if (!is_wanted(settings_, shape)) continue;
       for (const double anchor : settings_.anchors) add(shape, anchor);
       std::fprintf(stderr, "methods: %s: done\n", shape.name.c_str());
     }
@@ -114,9 +121,50 @@ class MethodTable {
                         "mean displacement, %", "updates", "seconds"}};
 };
 
+/// Whether every shape descends at every number of faces.
+class DescentTable {
+ public:
+  explicit DescentTable(const Settings& settings)
+      : settings_(settings), executor_(Executor::cpu(settings.threads)) {}
+
+  std::string text() {
+    for (const shapes::NamedShape& shape : shapes::drawn_shapes()) {
+      if (!is_wanted(settings_, shape)) continue;
+      for (const int faces : settings_.sizes) add(shape, faces);
+    }
+    return table_.text();
+  }
+
+ private:
+  void add(const shapes::NamedShape& shape, int faces) {
+    ReflectOptions options;
+    options.faces = faces;
+    options.rim_updates = settings_.updates;
+    options.face_updates = settings_.updates;
+    const auto input = reflect::prepared_input(shape.draw(), shape.name, options);
+    const Eigen::VectorXd area = reflect::measure_faces(input.mesh).area;
+    const ReflectResult result = reflect_shape(input, options, executor_, RunControl());
+    table_.add({shape.name, std::to_string(faces), std::to_string(input.mesh.triangle_count()),
+                number_text(area.minCoeff() / area.mean(), 2), number_text(result.before.total, 3),
+                number_text(result.after.total, 3),
+                decimals(100.0 * result.after.total / result.before.total, 1),
+                decimals(100.0 * result.mean_displacement, 2),
+                std::to_string(result.updates.size()), decimals(result.seconds, 1)});
+    std::fprintf(stderr, "descent: %s, %d faces: %.4g to %.4g\n", shape.name.c_str(), faces,
+                 result.before.total, result.after.total);
+  }
+
+  const Settings& settings_;
+  Executor executor_;
+  MarkdownTable table_{{"shape", "faces asked for", "faces", "smallest face / mean",
+                        "energy before", "after", "share, %", "mean displacement, %", "updates",
+                        "seconds"}};
+};
+
 void print(const Settings& settings, const std::vector<std::string>& parts) {
   const Executor executor = Executor::cpu(settings.threads);
   for (const std::string& part : parts) {
+    if (part == "descent") std::puts(DescentTable(settings).text().c_str());
     if (part == "methods") std::puts(MethodTable(settings).text().c_str());
     if (part == "figures") {
       std::puts(reflect_figures(settings.figures, settings.plots, executor).text().c_str());
@@ -132,15 +180,18 @@ void print(const Settings& settings, const std::vector<std::string>& parts) {
 int main(int argc, char** argv) try {
   using namespace lensforge::bench;
   Settings settings;
-  std::vector<std::string> parts{"methods", "figures", "slopes"};
+  std::vector<std::string> parts{"descent", "methods", "figures", "slopes"};
   CLI::App app("Tables of the reflector stage on the drawn shapes.");
   app.add_option("--parts", parts,
-                 "methods: both at equal displacement; figures; slopes; all without it")
+                 "descent: every shape at several numbers of faces; methods: both at equal "
+                 "displacement; figures; slopes; all without it")
       ->delimiter(',')
       ->check(CLI::IsMember(parts));
-  app.add_option("--shapes", settings.shapes, "of the methods, their names; all without it")
+  app.add_option("--shapes", settings.shapes, "of descent and methods, their names; all without it")
       ->delimiter(',');
   app.add_option("--anchors", settings.anchors, "of the exact method, values of beta")
+      ->delimiter(',');
+  app.add_option("--sizes", settings.sizes, "of descent, numbers of faces, 20 or more")
       ->delimiter(',');
   app.add_option("--faces", settings.faces, "of every shape of the methods, 20 or more");
   app.add_option("--updates", settings.updates, "at most, of either kind of element");

@@ -15,6 +15,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -140,6 +141,109 @@ SurfaceMesh quartered(const SurfaceMesh& mesh) {
     fine.triangles.col(4 * k + 3) << m[0], m[1], m[2];
   }
   return fine;
+}
+
+namespace {
+
+/// A face's corners along one of its sides: the one at the edge's first vertex, then the other.
+std::array<int, 2> side_corners(const SurfaceMesh& mesh, const Side& side) {
+  const int a = 3 * side.face + side.k;
+  const int b = 3 * side.face + (side.k + 1) % 3;
+  return mesh.triangles(side.k, side.face) == side.from ? std::array{a, b} : std::array{b, a};
+}
+
+/// Sets of corners that are one vertex.
+class CornerSets {
+ public:
+  explicit CornerSets(Eigen::Index corners) : parent_(static_cast<std::size_t>(corners)) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
+
+  int of(int corner) {
+    int& parent = parent_[static_cast<std::size_t>(corner)];
+    while (parent != parent_[static_cast<std::size_t>(parent)]) {
+      parent = parent_[static_cast<std::size_t>(parent)];
+    }
+    return parent;
+  }
+
+  void join(std::array<int, 2> one, std::array<int, 2> other) {
+    for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
+      parent_[static_cast<std::size_t>(of(one[end]))] = of(other[end]);
+    }
+  }
+
+ private:
+  std::vector<int> parent_;
+};
+
+/// A side at its angle around the edge.
+struct SideAngle {
+  double angle;
+  bool material_after;  ///< Else before it, at smaller angles.
+  const Side* side;
+};
+
+/// The sides of an edge by their angles; where faces lie in the same place, the end of the material
+/// comes first.
+std::vector<SideAngle> around_edge(const SurfaceMesh& mesh, std::span<const Side> sides) {
+  const Eigen::Vector3d from = mesh.vertices.col(sides.front().from);
+  const Eigen::Vector3d axis = (mesh.vertices.col(sides.front().to) - from).stableNormalized();
+  const Eigen::Vector3d u = axis.unitOrthogonal();
+  const Eigen::Vector3d v = axis.cross(u);
+  std::vector<SideAngle> around;
+  for (const Side& side : sides) {
+    const Eigen::Vector3d out = mesh.corner(side.face, (side.k + 2) % 3) - from;
+    const bool against = mesh.triangles(side.k, side.face) != side.from;
+    around.push_back({std::atan2(out.dot(v), out.dot(u)), against, &side});
+  }
+  std::sort(around.begin(), around.end(), [](const SideAngle& a, const SideAngle& b) {
+    return std::tie(a.angle, a.material_after, a.side->face) <
+           std::tie(b.angle, b.material_after, b.side->face);
+  });
+  return around;
+}
+
+void join_across_edge(const SurfaceMesh& mesh, std::span<const Side> sides, CornerSets& sets) {
+  if (sides.size() == 2) {
+    sets.join(side_corners(mesh, sides[0]), side_corners(mesh, sides[1]));
+  }
+  if (sides.size() <= 2) return;
+  const std::vector<SideAngle> around = around_edge(mesh, sides);
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    const SideAngle& one = around[i];
+    const SideAngle& next = around[(i + 1) % around.size()];
+    if (one.material_after && !next.material_after) {
+      sets.join(side_corners(mesh, *one.side), side_corners(mesh, *next.side));
+    }
+  }
+}
+
+}  // namespace
+
+SurfaceMesh separated(const SurfaceMesh& mesh) {
+  const std::vector<Side> sides = sorted_sides(mesh);
+  CornerSets sets(3 * mesh.triangle_count());
+  for (auto begin = sides.begin(); begin != sides.end();) {
+    const auto end = std::find_if(begin, sides.end(), [&](const Side& side) {
+      return side.from != begin->from || side.to != begin->to;
+    });
+    join_across_edge(mesh, {begin, end}, sets);
+    begin = end;
+  }
+  std::vector<int> number(static_cast<std::size_t>(3 * mesh.triangle_count()), -1);
+  std::vector<int> origin;
+  SurfaceMesh result{{}, mesh.triangles, {}};
+  for (int corner = 0; corner < 3 * mesh.triangle_count(); ++corner) {
+    int& vertex = number[static_cast<std::size_t>(sets.of(corner))];
+    if (vertex < 0) {
+      vertex = static_cast<int>(origin.size());
+      origin.push_back(mesh.triangles(corner % 3, corner / 3));
+    }
+    result.triangles(corner % 3, corner / 3) = vertex;
+  }
+  result.vertices = mesh.vertices(Eigen::all, origin);
+  return result;
 }
 
 namespace {

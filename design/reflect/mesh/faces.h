@@ -57,13 +57,20 @@ double signed_volume(const SurfaceMesh& mesh);
 /// Length of the diagonal of the axis-aligned bounding box.
 double bounding_diagonal(const SurfaceMesh& mesh);
 
+/// Separates a mesh where it is no manifold: at an edge with more than two faces those stay
+/// together that have the same material between them, by the directions in which they run along it;
+/// one without a partner gets a boundary. Vertices where surfaces merely touch are doubled.
+/// @pre no edge with more than two faces between two vertices where the surface is one: quartered()
+///      gives every edge a vertex of its own.
+SurfaceMesh separated(const SurfaceMesh& mesh);
+
 /// Cuts every face in four at the middles of its edges: the same surface.
 SurfaceMesh quartered(const SurfaceMesh& mesh);
 
 /// Remeshes the surface into about `faces` even triangles by CGAL's isotropic remeshing (Botsch &
-/// Kobbelt 2004). Creases of more than 50° and boundaries keep their place.
-/// @return within 10 % of `faces` on smooth shapes; creases take whole edges. @pre mesh of
-/// repair_mesh()
+/// Kobbelt 2004). Creases of more than 50° that are longer than two edges, and boundaries, keep
+/// their place. @return within 3 % of `faces` on every drawn shape at 300 to 10,000 faces, none of
+/// them smaller than 0.7 % of their mean. @pre mesh of repair_mesh()
 /// @throw InputError naming --faces if CGAL cannot take the mesh.
 SurfaceMesh remeshed(const SurfaceMesh& mesh, int faces);
 
