@@ -65,8 +65,11 @@ nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settin
                          {"energy", energies.total}};
   const double ghz = settings.reflect.radar_ghz;
   if (ghz > 0.0) {
-    const reflect::RadarComparison radar = reflect::compare_radar(mesh, mesh, ghz, executor);
-    json["radar"] = {{"ghz", ghz}, {"mean_dbsm", reflect::mean_dbsm(radar.before)}};
+    const reflect::RadarComparison radar =
+        reflect::compare_radar(mesh, mesh, settings.reflect, executor);
+    json["radar"] = {{"ghz", ghz},
+                     {"polarization", reflect::polarization_word(radar.polarization)},
+                     {"mean_dbsm", reflect::mean_dbsm(radar.before)}};
   }
   return json;
 }

@@ -99,6 +99,9 @@ void describe(Description& d, ReflectOptions& o) {
   d.number("--radar", o.radar_ghz, Limits::zero_or(0.01, 1000), "GHz",
            "compute radar cross-sections around the horizon too, for a mesh in millimetres; "
            "0 computes none");
+  d.word("--polarization", o.polarization,
+         {{"vv", Polarization::kVertical}, {"hh", Polarization::kHorizontal}},
+         "of --radar: the electric field sent and received is vertical or horizontal");
   d.flag("--force", o.force, "replace files that lensforge did not write").left_out =
       "it does not change the shape";
 }

@@ -37,6 +37,12 @@ enum class Method {
 /// Axis across which a shape stays symmetric, about the middle of the bounding box.
 enum class Symmetry { kNone = -1, kX = 0, kY = 1, kZ = 2 };
 
+/// Direction of the electric field that a radar sends and receives.
+enum class Polarization {
+  kVertical,    ///< In the plane of sight and z.
+  kHorizontal,  ///< Along the horizon.
+};
+
 /// Options of a run. Lengths and places are in the units of the mesh, z is up.
 struct ReflectOptions {
   GoalKind goal = GoalKind::kStealth;
@@ -65,7 +71,8 @@ struct ReflectOptions {
   double max_displacement = 0.0;  ///< Limit for a vertex; 0: none.
   double min_thickness = 0.0;     ///< Minimum of the material behind a vertex; 0: none.
   double radar_ghz = 0.0;         ///< Frequency of radar cross-sections; 0: none.
-  bool force = false;             ///< Replace files that lensforge did not write.
+  Polarization polarization = Polarization::kVertical;  ///< Of the radar.
+  bool force = false;  ///< Replace files that lensforge did not write.
   /// File that takes a checkpoint every second; none is written if empty.
   std::filesystem::path checkpoint;
   /// Continue from `checkpoint`. The same mesh and options give the same shape as without

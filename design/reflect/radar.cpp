@@ -21,7 +21,8 @@
 // Notation
 //   ω       unit vector towards the radar
 //   k       wave number 2π/λ
-//   d       direction of a ray before it hits a face with the normal n
+//   e       unit vector of the electric field that the radar sends and receives
+//   d, f    direction and field of a ray before it hits a face with the normal n
 //   path    from a plane through the middle of the mesh, along the ray, and back to that plane
 
 namespace lensforge::reflect {
@@ -57,119 +58,152 @@ std::complex<double> triangle_wave(std::array<double, 3> phase) {
   return -(mean_wave(phase[1], phase[2]) - mean_wave(phase[0], phase[1])) / spread;
 }
 
-/// One bounce: Σ (n·ω) ∫ e^{2ikω·r} dA over the faces, each weighted by its visible share.
-class OneBounce {
- public:
-  OneBounce(const SurfaceMesh& mesh, const Vector3d& towards, double wavelength)
-      : mesh_(mesh),
-        scene_(mesh),
-        towards_(towards),
-        middle_(0.5 * (mesh.vertices.rowwise().maxCoeff() + mesh.vertices.rowwise().minCoeff())),
-        wave_number_(2.0 * pi / wavelength) {}
+}  // namespace
 
+/// What one direction and polarization of the radar add up.
+class RadarBody::View {
+ public:
+  View(const RadarBody& body, const Vector3d& towards, Polarization polarization)
+      : body_(body),
+        towards_(towards),
+        u_(towards.unitOrthogonal()),
+        v_(towards.cross(u_)),
+        field_(radar_field(towards, polarization)) {}
+
+  /// One bounce: (n·ω) ∫ e^{−2ikω·r} dA over a face, weighted by its visible share.
   [[nodiscard]] std::array<double, 2> face(std::int64_t k) const {
-    const Corners c = mesh_.corners(k);
+    const Corners c = body_.mesh_.corners(k);
     Vector3d twice = area_normal(c);
     if (twice.dot(towards_) < 0.0) twice = -twice;
-    const double share = seen_share(c, twice.normalized());
+    const Vector3d n = twice.normalized();
+    const Vector3d middle = (c.v0 + c.v1 + c.v2) / 3.0;
+    const double share =
+        seen_share(std::array{middle, Vector3d(0.5 * (middle + c.v0)),
+                              Vector3d(0.5 * (middle + c.v1)), Vector3d(0.5 * (middle + c.v2))},
+                   n);
     if (share == 0.0) return {};
-    const auto phase = [&](const Vector3d& p) {
-      return -2.0 * wave_number_ * towards_.dot(p - middle_);
-    };
     const std::complex<double> wave =
         share * twice.dot(towards_) * triangle_wave({phase(c.v0), phase(c.v1), phase(c.v2)});
     return {wave.real(), wave.imag()};
   }
 
- private:
-  /// Visible share of four points of the face.
-  [[nodiscard]] double seen_share(const Corners& c, const Vector3d& n) const {
-    const Vector3d middle = (c.v0 + c.v1 + c.v2) / 3.0;
-    int seen = 0;
-    for (const Vector3d& p : {middle, Vector3d(0.5 * (middle + c.v0)),
-                              Vector3d(0.5 * (middle + c.v1)), Vector3d(0.5 * (middle + c.v2))}) {
-      seen += scene_.blocked(scene_.lifted(p, n), towards_, RayScene::kAnywhere) ? 0 : 1;
-    }
-    return 0.25 * seen;
+  /// What an edge adds to the faces beside it: (i/k) f ∫ e^{−2ikω·r} dl, weighted likewise.
+  [[nodiscard]] std::array<double, 2> edge(std::int64_t k) const {
+    const RadarEdge& edge = body_.edges_[index_of(k)];
+    const double fringe = edge_fringe(edge, towards_, field_);
+    if (fringe == 0.0) return {};
+    const Vector3d side = edge.to - edge.from;
+    const double share =
+        seen_share(std::array{Vector3d(edge.from + side / 6.0), Vector3d(edge.from + 0.5 * side),
+                              Vector3d(edge.to - side / 6.0)},
+                   lift_of(edge));
+    const std::complex<double> wave = share * fringe * side.norm() / body_.wave_number_ *
+                                      mean_wave(phase(edge.from), phase(edge.to));
+    return {wave.real(), wave.imag()};
   }
 
-  const SurfaceMesh& mesh_;
-  RayScene scene_;
-  Vector3d towards_;
-  Vector3d middle_;
-  double wave_number_;
-};
-
-/// The square of tubes that covers a mesh seen from ω. Tubes start at random places of their cells,
-/// so that their grid has no phase of its own.
-class Aperture {
- public:
-  Aperture(const SurfaceMesh& mesh, const Vector3d& towards, double wavelength)
-      : scene_(mesh),
-        faces_(measure_faces(mesh)),
-        towards_(towards),
-        u_(towards.unitOrthogonal()),
-        v_(towards.cross(u_)),
-        middle_(0.5 * (mesh.vertices.rowwise().maxCoeff() + mesh.vertices.rowwise().minCoeff())),
-        radius_(0.5 * bounding_diagonal(mesh)),
-        wave_number_(2.0 * pi / wavelength) {
-    const double tubes = tubes_across(mesh, wavelength);
-    count_ = static_cast<std::int64_t>(tubes);
-    cell_ = 2.0 * radius_ / tubes;
-  }
-
-  [[nodiscard]] std::int64_t rows() const { return count_; }
-  [[nodiscard]] double tube_area() const { return cell_ * cell_; }
-
-  /// Amplitude of a row of tubes, each of area 1.
+  /// Two and three bounces: amplitude of a row of tubes, each of area 1. They start at random
+  /// places of their cells, so that their grid has no phase of its own.
   [[nodiscard]] std::array<double, 2> row(std::int64_t r) const {
     std::complex<double> sum = 0.0;
-    for (std::int64_t c = 0; c < count_; ++c) {
-      const auto cell = static_cast<std::uint64_t>(r * count_ + c);
-      const double x = (static_cast<double>(c) + jitter(2 * cell + 1)) * cell_ - radius_;
-      const double y = (static_cast<double>(r) + jitter(2 * cell + 2)) * cell_ - radius_;
-      sum += tube(middle_ + x * u_ + y * v_ + 2.0 * radius_ * towards_);
+    for (std::int64_t c = 0; c < body_.tubes_; ++c) {
+      const auto cell = static_cast<std::uint64_t>(r * body_.tubes_ + c);
+      const double x = (static_cast<double>(c) + jitter(2 * cell + 1)) * body_.cell_;
+      const double y = (static_cast<double>(r) + jitter(2 * cell + 2)) * body_.cell_;
+      sum += tube(body_.middle_ + (x - body_.radius_) * u_ + (y - body_.radius_) * v_ +
+                  2.0 * body_.radius_ * towards_);
     }
     return {sum.real(), sum.imag()};
   }
 
  private:
+  [[nodiscard]] double phase(const Vector3d& p) const {
+    return -2.0 * body_.wave_number_ * towards_.dot(p - body_.middle_);
+  }
+
+  /// Direction from an edge to where none of its own faces is in the way of the radar.
+  [[nodiscard]] Vector3d lift_of(const RadarEdge& edge) const {
+    if (edge.open < 2.0) return (edge.faces[0].normal + edge.faces[1].normal).normalized();
+    const WedgeFace& face = edge.faces[0];
+    const Vector3d n = face.normal.dot(towards_) < 0.0 ? Vector3d(-face.normal) : face.normal;
+    return (n - face.out).normalized();
+  }
+
+  template <std::size_t N>
+  [[nodiscard]] double seen_share(const std::array<Vector3d, N>& points,
+                                  const Vector3d& lift) const {
+    const auto seen = std::count_if(points.begin(), points.end(), [&](const Vector3d& p) {
+      return !body_.scene_.blocked(body_.scene_.lifted(p, lift), towards_, RayScene::kAnywhere);
+    });
+    return static_cast<double>(seen) / static_cast<double>(N);
+  }
+
   [[nodiscard]] std::complex<double> tube(Vector3d p) const {
     std::complex<double> sum = 0.0;
     Vector3d d = -towards_;
-    double path = -2.0 * radius_;
-    double sign = 1.0;
+    Vector3d f = field_;
+    double path = -2.0 * body_.radius_;
     for (int bounce = 0; bounce < kBounces; ++bounce) {
-      const RayHit hit = scene_.nearest(p, d);
+      const RayHit hit = body_.scene_.nearest(p, d);
       if (!hit.met()) break;
-      Vector3d n = faces_.normal.col(hit.face);
+      Vector3d n = body_.faces_.normal.col(hit.face);
       if (n.dot(d) > 0.0) n = -n;
       path += hit.distance;
-      p = scene_.lifted(p + hit.distance * d, n);
+      p = body_.scene_.lifted(p + hit.distance * d, n);
       const bool back = n.dot(towards_) > 0.0;
-      if (bounce > 0 && back && !scene_.blocked(p, towards_, RayScene::kAnywhere)) {
-        const double factor = 0.5 * sign * (1.0 - n.dot(towards_) / n.dot(d));
-        sum += std::polar(factor, wave_number_ * (path - towards_.dot(p - middle_)));
+      if (bounce > 0 && back && !body_.scene_.blocked(p, towards_, RayScene::kAnywhere)) {
+        const double factor = f.dot(field_) - d.dot(field_) * n.dot(f) / n.dot(d);
+        sum += std::polar(factor, body_.wave_number_ * (path - towards_.dot(p - body_.middle_)));
       }
       d -= 2.0 * n.dot(d) * n;
-      sign = -sign;
+      f = 2.0 * n.dot(f) * n - f;
     }
     return sum;
   }
 
-  RayScene scene_;
-  Faces faces_;
+  const RadarBody& body_;
   Vector3d towards_;
   Vector3d u_;
   Vector3d v_;
-  Vector3d middle_;
-  double radius_;
-  double wave_number_;
-  std::int64_t count_ = 0;
-  double cell_ = 0.0;
+  Vector3d field_;
 };
 
-}  // namespace
+RadarBody::RadarBody(const SurfaceMesh& mesh, double wavelength)
+    : mesh_(mesh),
+      scene_(mesh),
+      faces_(measure_faces(mesh)),
+      edges_(radar_edges(mesh, wavelength)),
+      middle_(0.5 * (mesh.vertices.rowwise().maxCoeff() + mesh.vertices.rowwise().minCoeff())),
+      radius_(0.5 * bounding_diagonal(mesh)),
+      wave_number_(2.0 * pi / wavelength) {
+  require_radar_size(mesh, wavelength);
+  tubes_ = static_cast<std::int64_t>(tubes_across(mesh, wavelength));
+  cell_ = 2.0 * radius_ / static_cast<double>(tubes_);
+}
+
+std::complex<double> RadarBody::amplitude(const Vector3d& towards, Polarization polarization,
+                                          const Executor& executor) const {
+  const View view(*this, towards, polarization);
+  const auto row = [&](std::int64_t r) { return view.row(r); };
+  const auto tubes = parallel_sum<2>(executor, "radar tubes", tubes_, row, 4);
+  const auto face = [&](std::int64_t k) { return view.face(k); };
+  const auto faces = parallel_sum<2>(executor, "radar faces", mesh_.triangle_count(), face, 64);
+  const auto edge = [&](std::int64_t k) { return view.edge(k); };
+  const auto edges = parallel_sum<2>(executor, "radar edges", std::ssize(edges_), edge, 64);
+  const double area = cell_ * cell_;
+  return {area * tubes[0] + faces[0] + edges[0], area * tubes[1] + faces[1] + edges[1]};
+}
+
+double RadarBody::cross_section(const Vector3d& towards, Polarization polarization,
+                                const Executor& executor) const {
+  return wave_number_ * wave_number_ / pi * std::norm(amplitude(towards, polarization, executor));
+}
+
+Vector3d radar_field(const Vector3d& towards, Polarization polarization) {
+  Vector3d across = Vector3d::UnitZ().cross(towards);
+  across = across.norm() > 0.0 ? across.normalized() : Vector3d::UnitY();
+  return polarization == Polarization::kHorizontal ? across : Vector3d(towards.cross(across));
+}
 
 void require_radar_size(const SurfaceMesh& mesh, double wavelength) {
   const double most = std::sqrt(kMaxRadarRays);
@@ -179,27 +213,13 @@ void require_radar_size(const SurfaceMesh& mesh, double wavelength) {
                    number_text(most / kTubesPerWavelength, 4) + "; lower the frequency");
 }
 
-double radar_cross_section(const SurfaceMesh& mesh, const Vector3d& towards, double wavelength,
-                           const Executor& executor) {
-  require_radar_size(mesh, wavelength);
-  const Aperture aperture(mesh, towards, wavelength);
-  const auto row = [&](std::int64_t r) { return aperture.row(r); };
-  const auto tubes = parallel_sum<2>(executor, "radar tubes", aperture.rows(), row, 4);
-  const OneBounce one(mesh, towards, wavelength);
-  const auto face = [&](std::int64_t k) { return one.face(k); };
-  const auto faces = parallel_sum<2>(executor, "radar faces", mesh.triangle_count(), face, 64);
-  const double amplitude = std::hypot(aperture.tube_area() * tubes[0] + faces[0],
-                                      aperture.tube_area() * tubes[1] + faces[1]);
-  return 4.0 * pi * amplitude * amplitude / (wavelength * wavelength);
-}
-
-std::vector<double> horizon_cross_sections(const SurfaceMesh& mesh, double wavelength, int count,
-                                           const Executor& executor) {
+std::vector<double> horizon_cross_sections(const RadarBody& body, Polarization polarization,
+                                           int count, const Executor& executor) {
   std::vector<double> sections;
   for (int i = 0; i < count; ++i) {
     const double azimuth = 2.0 * pi * i / count;
-    sections.push_back(radar_cross_section(mesh, {std::cos(azimuth), std::sin(azimuth), 0.0},
-                                           wavelength, executor));
+    sections.push_back(
+        body.cross_section({std::cos(azimuth), std::sin(azimuth), 0.0}, polarization, executor));
   }
   return sections;
 }
@@ -215,9 +235,10 @@ constexpr int kRings = 6;
 
 double dbsm(double section) { return 10.0 * std::log10(std::max(section, kFloor)); }
 
-std::vector<double> sections(const SurfaceMesh& mesh, double ghz, const Executor& executor) {
-  std::vector<double> result =
-      horizon_cross_sections(mesh, radar_wavelength(ghz), kRadarAzimuths, executor);
+std::vector<double> sections(const SurfaceMesh& mesh, double ghz, Polarization polarization,
+                             const Executor& executor) {
+  const RadarBody body(mesh, radar_wavelength(ghz));
+  std::vector<double> result = horizon_cross_sections(body, polarization, kRadarAzimuths, executor);
   for (double& section : result) section *= kSquareMillimetres;
   return result;
 }
@@ -240,9 +261,15 @@ std::string curve(const std::vector<double>& values, double outer, const std::st
 
 double radar_wavelength(double ghz) { return kLightSpeed / ghz; }
 
-RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after, double ghz,
-                              const Executor& executor) {
-  return {ghz, sections(before, ghz, executor), sections(after, ghz, executor)};
+RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after,
+                              const ReflectOptions& options, const Executor& executor) {
+  const double ghz = options.radar_ghz;
+  return {ghz, options.polarization, sections(before, ghz, options.polarization, executor),
+          sections(after, ghz, options.polarization, executor)};
+}
+
+const char* polarization_word(Polarization polarization) {
+  return polarization == Polarization::kVertical ? "vv" : "hh";
 }
 
 double mean_dbsm(const std::vector<double>& sections) {
@@ -252,6 +279,7 @@ double mean_dbsm(const std::vector<double>& sections) {
 
 nlohmann::json radar_json(const RadarComparison& comparison) {
   return {{"ghz", comparison.ghz},
+          {"polarization", polarization_word(comparison.polarization)},
           {"mean_dbsm_before", mean_dbsm(comparison.before)},
           {"mean_dbsm_after", mean_dbsm(comparison.after)}};
 }

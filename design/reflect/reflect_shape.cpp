@@ -95,7 +95,7 @@ class Schedule {
       result.after = evaluated();
       if (options_.radar_ghz > 0.0) {
         result.radar = compare_radar(frame_.from_unit(reference_), frame_.from_unit(mesh_),
-                                     options_.radar_ghz, executor_);
+                                     options_, executor_);
       }
     } catch (const Interrupted&) {
       result.status = ReflectResult::Status::kInterrupted;

@@ -30,6 +30,7 @@ void describe(Description& d, ReflectUpdate& update);
 /// in millimetres.
 struct RadarComparison {
   double ghz = 0.0;
+  Polarization polarization = Polarization::kVertical;
   std::vector<double> before;
   std::vector<double> after;
 };

@@ -297,10 +297,10 @@ std::string energy_section(const ReflectResult& result) {
 
 std::string radar_section(const ReflectResult& result) {
   if (!result.radar) return "";
-  const std::string words = "Around the horizon at " + number_text(result.radar->ghz) +
-                            " GHz, on average " + decimal_text(mean_dbsm(result.radar->before), 1) +
-                            " dBsm before, " + decimal_text(mean_dbsm(result.radar->after), 1) +
-                            " dBsm after.";
+  const std::string words = "Around the horizon at " + number_text(result.radar->ghz) + " GHz, " +
+                            polarization_word(result.radar->polarization) + ", on average " +
+                            decimal_text(mean_dbsm(result.radar->before), 1) + " dBsm before, " +
+                            decimal_text(mean_dbsm(result.radar->after), 1) + " dBsm after.";
   return html_section(
       "Radar cross-section",
       element("figure", "style=\"max-width:34rem\"",

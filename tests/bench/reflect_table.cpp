@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/almond_table.h"
 #include "bench/markdown_table.h"
 #include "bench/reflect_figures.h"
 #include "core/text/number_text.h"
@@ -41,6 +42,7 @@ struct Settings {
   int updates = 30;
   int threads = 2;
   std::string plots;
+  std::string almond;
 };
 
 bool is_wanted(const Settings& settings, const shapes::NamedShape& shape) {
@@ -169,6 +171,9 @@ void print(const Settings& settings, const std::vector<std::string>& parts) {
     if (part == "figures") {
       std::puts(reflect_figures(settings.figures, settings.plots, executor).text().c_str());
     }
+    if (part == "almond" && !settings.almond.empty()) {
+      std::puts(almond_table(settings.almond, executor).text().c_str());
+    }
     if (part == "slopes") std::puts(slope_table(executor).text().c_str());
     std::fflush(stdout);
   }
@@ -180,11 +185,11 @@ void print(const Settings& settings, const std::vector<std::string>& parts) {
 int main(int argc, char** argv) try {
   using namespace lensforge::bench;
   Settings settings;
-  std::vector<std::string> parts{"descent", "methods", "figures", "slopes"};
+  std::vector<std::string> parts{"descent", "methods", "figures", "slopes", "almond"};
   CLI::App app("Tables of the reflector stage on the drawn shapes.");
   app.add_option("--parts", parts,
                  "descent: every shape at several numbers of faces; methods: both at equal "
-                 "displacement; figures; slopes; all without it")
+                 "displacement; figures; slopes; almond; all without it")
       ->delimiter(',')
       ->check(CLI::IsMember(parts));
   app.add_option("--shapes", settings.shapes, "of descent and methods, their names; all without it")
@@ -199,6 +204,10 @@ int main(int argc, char** argv) try {
       ->delimiter(',')
       ->check(CLI::IsMember(figure_names()));
   app.add_option("--plots", settings.plots, "folder for energy_over_time.svg of figure 14")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--almond", settings.almond,
+                 "folder with measured cross-sections of the NASA almond (Austin RCS Benchmark "
+                 "Suite, problem III-A); without it that part is left out")
       ->check(CLI::ExistingDirectory);
   app.add_option("--threads", settings.threads);
   CLI11_PARSE(app, argc, argv);
