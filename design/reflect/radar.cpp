@@ -70,7 +70,8 @@ class RadarBody::View {
         v_(towards.cross(u_)),
         field_(radar_field(towards, polarization)) {}
 
-  /// One bounce: (n·ω) ∫ e^{−2ikω·r} dA over a face, weighted by its visible share.
+  /// One bounce: (n·ω) ∫ e^{−2ikω·r} dA over a face, weighted by its visible share and for its
+  /// curvature.
   [[nodiscard]] std::array<double, 2> face(std::int64_t k) const {
     const Corners c = body_.mesh_.corners(k);
     Vector3d twice = area_normal(c);
@@ -82,8 +83,9 @@ class RadarBody::View {
                               Vector3d(0.5 * (middle + c.v1)), Vector3d(0.5 * (middle + c.v2))},
                    n);
     if (share == 0.0) return {};
-    const std::complex<double> wave =
-        share * twice.dot(towards_) * triangle_wave({phase(c.v0), phase(c.v1), phase(c.v2)});
+    const std::complex<double> wave = share * twice.dot(towards_) *
+                                      body_.curved_[index_of(k)].of(field_, n) *
+                                      triangle_wave({phase(c.v0), phase(c.v1), phase(c.v2)});
     return {wave.real(), wave.imag()};
   }
 
@@ -177,6 +179,11 @@ RadarBody::RadarBody(const SurfaceMesh& mesh, double wavelength)
       radius_(0.5 * bounding_diagonal(mesh)),
       wave_number_(2.0 * pi / wavelength) {
   require_radar_size(mesh, wavelength);
+  std::vector<bool> creased(static_cast<std::size_t>(mesh.vertex_count()));
+  for (const RadarEdge& edge : edges_) {
+    for (const int v : edge.vertices) creased[index_of(v)] = true;
+  }
+  curved_ = curved_faces(mesh, creased, wavelength);
   tubes_ = static_cast<std::int64_t>(tubes_across(mesh, wavelength));
   cell_ = 2.0 * radius_ / static_cast<double>(tubes_);
 }
@@ -235,8 +242,8 @@ constexpr int kRings = 6;
 
 double dbsm(double section) { return 10.0 * std::log10(std::max(section, kFloor)); }
 
-std::vector<double> sections(const SurfaceMesh& mesh, double ghz, Polarization polarization,
-                             const Executor& executor) {
+std::vector<double> square_metres(const SurfaceMesh& mesh, double ghz, Polarization polarization,
+                                  const Executor& executor) {
   const RadarBody body(mesh, radar_wavelength(ghz));
   std::vector<double> result = horizon_cross_sections(body, polarization, kRadarAzimuths, executor);
   for (double& section : result) section *= kSquareMillimetres;
@@ -264,8 +271,8 @@ double radar_wavelength(double ghz) { return kLightSpeed / ghz; }
 RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after,
                               const ReflectOptions& options, const Executor& executor) {
   const double ghz = options.radar_ghz;
-  return {ghz, options.polarization, sections(before, ghz, options.polarization, executor),
-          sections(after, ghz, options.polarization, executor)};
+  return {ghz, options.polarization, square_metres(before, ghz, options.polarization, executor),
+          square_metres(after, ghz, options.polarization, executor)};
 }
 
 const char* polarization_word(Polarization polarization) {

@@ -11,6 +11,7 @@
 #include "core/compute/executor.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/reflect/mesh/faces.h"
+#include "design/reflect/radar_curvature.h"
 #include "design/reflect/radar_edges.h"
 #include "design/reflect/reflect_shape.h"
 
@@ -31,11 +32,12 @@ class RadarBody {
 
   /// Σ (n·ω) ∫ e^{−2ikω·r} dA over the visible surface, with every face's integral exact (physical
   /// optics), seen from the unit vector ω `towards`. Edges add what the current beside them has
-  /// more than that of physical optics (edge_fringe()). Two and three bounces are added by shooting
-  /// and bouncing rays (Ling, Chou & Lee 1989): the current 2 n × h of a ray with the field f, in
-  /// tubes a tenth of a wavelength wide, Σ_tubes ΔA (f·e − (d·e)(n·f)/(n·d)) e^{ik·path}. The
-  /// origin of phases is the middle of the bounding box; time goes as e^{−iωt}. Same bits for any
-  /// number of threads. @throw Interrupted
+  /// more than that of physical optics (edge_fringe()), and faces of smooth surfaces are weighted
+  /// for their curvature (CurvedFace). Two and three bounces are added by shooting and bouncing
+  /// rays (Ling, Chou & Lee 1989): the current 2 n × h of a ray with the field f, in tubes a tenth
+  /// of a wavelength wide, Σ_tubes ΔA (f·e − (d·e)(n·f)/(n·d)) e^{ik·path}. The origin of phases is
+  /// the middle of the bounding box; time goes as e^{−iωt}. Same bits for any number of threads.
+  /// @throw Interrupted
   [[nodiscard]] std::complex<double> amplitude(const Eigen::Vector3d& towards,
                                                Polarization polarization,
                                                const Executor& executor) const;
@@ -51,6 +53,7 @@ class RadarBody {
   RayScene scene_;
   Faces faces_;
   std::vector<RadarEdge> edges_;
+  std::vector<CurvedFace> curved_;  ///< By the faces.
   Eigen::Vector3d middle_;
   double radius_;
   double wave_number_;

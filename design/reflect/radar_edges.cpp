@@ -125,7 +125,8 @@ double edge_fringe(const RadarEdge& edge, const Vector3d& towards, const Vector3
 std::vector<RadarEdge> radar_edges(const SurfaceMesh& mesh, double wavelength) {
   std::vector<RadarEdge> edges;
   for (const Edge& edge : make_edges(mesh).edges) {
-    RadarEdge radar{mesh.vertices.col(edge.from), mesh.vertices.col(edge.to), {}, 2.0};
+    RadarEdge radar{
+        mesh.vertices.col(edge.from), mesh.vertices.col(edge.to), {}, 2.0, {edge.from, edge.to}};
     const double length = (radar.to - radar.from).norm();
     const Vector3d along = (radar.to - radar.from) / length;
     const WedgeFace left = wedge_face(mesh, edge.left, radar.from, along);

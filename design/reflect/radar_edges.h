@@ -23,6 +23,7 @@ struct RadarEdge {
   Eigen::Vector3d to;
   std::array<WedgeFace, 2> faces;
   double open = 2.0;  ///< Angle outside of the material in units of π: 2 for the rim of a sheet.
+  std::array<int, 2> vertices{};  ///< Of the mesh: its ends.
 };
 
 /// The field that an edge adds to physical optics, per length of edge and for monostatic radar: the

@@ -24,7 +24,8 @@ RadarEdge wedge(double open) {
           Vector3d::UnitZ(),
           {WedgeFace{Vector3d::UnitX(), Vector3d::UnitY()},
            WedgeFace{out, {std::sin(angle), -std::cos(angle), 0.0}}},
-          open};
+          open,
+          {}};
 }
 
 Vector3d direction(double phi, double elevation = 0.0) {
@@ -46,8 +47,7 @@ double optics_of_faces(double open, double phi) {
 /// across.
 double keller(double open, double phi, double sign) {
   const double c = std::cos(pi / open);
-  return -std::sin(pi / open) / open *
-         (1.0 / (c - 1.0) + sign / (c - std::cos(2.0 * phi / open)));
+  return -std::sin(pi / open) / open * (1.0 / (c - 1.0) + sign / (c - std::cos(2.0 * phi / open)));
 }
 
 TEST(EdgeFringe, WithPhysicalOpticsIsKellersDiffractionByAWedge) {
@@ -107,7 +107,7 @@ TEST(EdgeFringe, IsFiniteInEveryDirection) {
 
 TEST(EdgeFringe, DoesNotDependOnTheOrderOfFacesAndTheSignOfTheField) {
   const RadarEdge edge = wedge(1.6);
-  const RadarEdge turned{edge.to, edge.from, {edge.faces[1], edge.faces[0]}, edge.open};
+  const RadarEdge turned{edge.to, edge.from, {edge.faces[1], edge.faces[0]}, edge.open, {}};
   const Vector3d towards = direction(1.1, 0.4);
   const Vector3d field = towards.cross(Vector3d(0.2, 0.9, -0.3)).normalized();
   EXPECT_DOUBLE_EQ(edge_fringe(edge, towards, field), edge_fringe(turned, towards, -field));
