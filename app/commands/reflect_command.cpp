@@ -65,11 +65,10 @@ nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settin
                          {"energy", energies.total}};
   const double ghz = settings.reflect.radar_ghz;
   if (ghz > 0.0) {
-    const reflect::RadarComparison radar =
-        reflect::compare_radar(mesh, mesh, settings.reflect, executor);
     json["radar"] = {{"ghz", ghz},
-                     {"polarization", reflect::polarization_word(radar.polarization)},
-                     {"mean_dbsm", reflect::mean_dbsm(radar.before)}};
+                     {"polarization", reflect::polarization_word(settings.reflect.polarization)},
+                     {"mean_dbsm", reflect::mean_dbsm(
+                                       reflect::radar_sections(mesh, settings.reflect, executor))}};
   }
   return json;
 }

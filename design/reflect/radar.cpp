@@ -242,14 +242,6 @@ constexpr int kRings = 6;
 
 double dbsm(double section) { return 10.0 * std::log10(std::max(section, kFloor)); }
 
-std::vector<double> square_metres(const SurfaceMesh& mesh, double ghz, Polarization polarization,
-                                  const Executor& executor) {
-  const RadarBody body(mesh, radar_wavelength(ghz));
-  std::vector<double> result = horizon_cross_sections(body, polarization, kRadarAzimuths, executor);
-  for (double& section : result) section *= kSquareMillimetres;
-  return result;
-}
-
 /// @param outer  dBsm of the outermost ring.
 std::string curve(const std::vector<double>& values, double outer, const std::string& colour) {
   std::string points;
@@ -268,11 +260,19 @@ std::string curve(const std::vector<double>& values, double outer, const std::st
 
 double radar_wavelength(double ghz) { return kLightSpeed / ghz; }
 
+std::vector<double> radar_sections(const SurfaceMesh& mesh, const ReflectOptions& options,
+                                   const Executor& executor) {
+  const RadarBody body(mesh, radar_wavelength(options.radar_ghz));
+  std::vector<double> result =
+      horizon_cross_sections(body, options.polarization, kRadarAzimuths, executor);
+  for (double& section : result) section *= kSquareMillimetres;
+  return result;
+}
+
 RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after,
                               const ReflectOptions& options, const Executor& executor) {
-  const double ghz = options.radar_ghz;
-  return {ghz, options.polarization, square_metres(before, ghz, options.polarization, executor),
-          square_metres(after, ghz, options.polarization, executor)};
+  return {options.radar_ghz, options.polarization, radar_sections(before, options, executor),
+          radar_sections(after, options, executor)};
 }
 
 const char* polarization_word(Polarization polarization) {

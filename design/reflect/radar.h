@@ -74,6 +74,11 @@ inline constexpr int kRadarAzimuths = 72;
 /// Wavelength of a frequency, mm.
 double radar_wavelength(double ghz);
 
+/// Cross-sections around the horizon, m², of a mesh in millimetres, at the frequency and
+/// polarization of the options. @throw InputError naming --radar; Interrupted.
+std::vector<double> radar_sections(const SurfaceMesh& mesh, const ReflectOptions& options,
+                                   const Executor& executor);
+
 /// Two meshes at the frequency and polarization of the options.
 /// @throw InputError naming --radar; Interrupted.
 RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after,

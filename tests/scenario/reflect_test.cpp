@@ -92,6 +92,36 @@ TEST_F(Reflect, EvaluatePrintsEnergiesAndWritesNothing) {
   EXPECT_EQ(listing(at("")), std::vector<std::string>{"shape.off"});
 }
 
+/// Two cubes that share an edge.
+constexpr const char* kTouchingCubes =
+    "OFF\n14 12 0\n0 0 0\n0 0 9\n0 9 0\n0 9 9\n9 0 0\n9 0 9\n9 9 0\n9 9 9\n"
+    "9 18 0\n9 18 9\n18 9 0\n18 9 9\n18 18 0\n18 18 9\n"
+    "4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3\n"
+    "4 6 7 9 8\n4 10 12 13 11\n4 6 10 11 7\n4 8 9 13 12\n4 6 8 12 10\n4 7 11 13 9\n";
+
+TEST_F(Reflect, EdgesWithMoreThanTwoFacesAreRemeshed) {
+  expect_refused(kTouchingCubes, {}, {"from 9,9,0 to 9,9,9", "more than two faces", "--faces N"});
+  const Outcome outcome =
+      run({"reflect", path("bad.off"), "--faces", "400", "--evaluate", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("surfaces separated at edges with more than two faces"));
+}
+
+TEST_F(Reflect, RadarHasTwoPolarizations) {
+  // Seen from the horizon the octahedron's four flat edges are across the vertical field.
+  double vertical = 0.0;
+  for (const char* word : {"vv", "hh"}) {
+    const Outcome outcome = run({"reflect", path("shape.off"), "--evaluate", "--json", "--radar",
+                                 "1000", "--polarization", word});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    const nlohmann::json radar = outcome.json()["radar"];
+    EXPECT_EQ(radar["polarization"], word);
+    if (vertical != 0.0) EXPECT_GT(std::abs(radar["mean_dbsm"].get<double>() - vertical), 0.1);
+    vertical = radar["mean_dbsm"];
+  }
+  expect_refused(kOctahedron, {"--polarization", "vh"}, {"--polarization", "vh"});
+}
+
 TEST_F(Reflect, FilesOfOthersAreKeptUnlessForced) {
   fs::create_directory(at("out"));
   write(at("out/surface.ply"), "mine");
