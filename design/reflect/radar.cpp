@@ -75,7 +75,8 @@ class RadarBody::View {
   [[nodiscard]] std::array<double, 2> face(std::int64_t k) const {
     const Corners c = body_.mesh_.corners(k);
     Vector3d twice = area_normal(c);
-    if (twice.dot(towards_) < 0.0) twice = -twice;
+    const bool behind = twice.dot(towards_) < 0.0;  // Seen through an open mesh.
+    if (behind) twice = -twice;
     const Vector3d n = twice.normalized();
     const Vector3d middle = (c.v0 + c.v1 + c.v2) / 3.0;
     const double share =
@@ -83,8 +84,8 @@ class RadarBody::View {
                               Vector3d(0.5 * (middle + c.v1)), Vector3d(0.5 * (middle + c.v2))},
                    n);
     if (share == 0.0) return {};
-    const std::complex<double> wave = share * twice.dot(towards_) *
-                                      body_.curved_[index_of(k)].of(field_, n) *
+    const std::complex<double> curved = behind ? 1.0 : body_.curved_[index_of(k)].of(field_, n);
+    const std::complex<double> wave = share * curved * twice.dot(towards_) *
                                       triangle_wave({phase(c.v0), phase(c.v1), phase(c.v2)});
     return {wave.real(), wave.imag()};
   }

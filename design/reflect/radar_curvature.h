@@ -23,8 +23,8 @@ struct ParabolicShares {
 ParabolicShares parabolic_shares(double k_rho);
 
 /// How much more or less than physical optics a face of a curved surface sends back: 1 for a flat
-/// one, for a cylinder the share of the parabolic one with its radius. For two curvatures the
-/// shares are multiplied.
+/// one, for a cylinder the share of the parabolic one with its radius, seen from outside. For two
+/// curvatures the shares are multiplied.
 struct CurvedFace {
   Eigen::Vector3d along;       ///< Unit; direction of one principal curvature.
   std::complex<double> share;  ///< For the electric field in this direction.
