@@ -104,7 +104,7 @@ Creases marked_creases(CgalMesh& mesh, double shortest) {
     double length = 0.0;
     for (std::size_t i = 0; i < chain.size(); ++i) {
       length += std::sqrt(squared_length(mesh, mesh.halfedge(chain[i])));
-      for (const int end : {0, 1}) {
+      for (const unsigned end : {0U, 1U}) {
         for (const Half h : CGAL::halfedges_around_target(mesh.halfedge(chain[i], end), mesh)) {
           const auto next = mesh.edge(h);
           if (!crease[next] || reached[next.idx()]) continue;
