@@ -81,12 +81,14 @@ SurfaceMesh with_flat_faces(const SurfaceMesh& mesh, const std::vector<int>& edg
   const EdgeTable table = make_edges(mesh);
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3i> faces;
-  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) vertices.push_back(mesh.vertices.col(v));
-  for (Eigen::Index f = 0; f < mesh.triangle_count(); ++f) faces.push_back(mesh.triangles.col(f));
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v)
+    vertices.emplace_back(mesh.vertices.col(v));
+  for (Eigen::Index f = 0; f < mesh.triangle_count(); ++f)
+    faces.emplace_back(mesh.triangles.col(f));
   for (const int e : edges) {
     const Edge& edge = table.edges[static_cast<std::size_t>(e)];
     const auto middle = static_cast<int>(vertices.size());
-    vertices.push_back(0.5 * (mesh.vertices.col(edge.from) + mesh.vertices.col(edge.to)));
+    vertices.emplace_back(0.5 * (mesh.vertices.col(edge.from) + mesh.vertices.col(edge.to)));
     Eigen::Vector3i& face = faces[static_cast<std::size_t>(edge.left)];
     int k = 0;
     while (face[k] == edge.from || face[k] == edge.to) ++k;
