@@ -35,7 +35,7 @@ constexpr double kMayAdd = 0.1;
 constexpr double kLargestGoal = 0.003;
 
 /// A level is idle if the wall's error falls by less than this share in so many iterations.
-constexpr double kIdleShare = 0.01;
+constexpr double kIdleShare = 0.005;
 constexpr std::size_t kIdleWindow = 10;
 
 /// Shares of a pixel's light, even over the pixel, that a Gaussian blur leaves 0, 1, 2 … pixels
