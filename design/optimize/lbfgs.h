@@ -287,8 +287,8 @@ using RawObjective = std::function<double(std::span<const double> x, std::span<d
 using RawPreconditioner = std::function<void(std::span<const double> g, std::span<double> r)>;
 
 /// Limited-memory BFGS (Liu & Nocedal 1989) with a preconditioner as initial matrix and a line
-/// search that meets the weak Wolfe conditions by bisection (Lewis & Overton 2013), after steps
-/// back by a parabola, or where the value is infinite. All vectors stay in the executor's memory;
+/// search that meets the weak Wolfe conditions by bisection (Lewis & Overton 2013), stepping back
+/// where the value is infinite, at first by a parabola. All vectors stay in the executor's memory;
 /// only scalar products leave it. Sums have a fixed order, so the result does not depend on the
 /// thread count.
 template <class Exec>
@@ -404,9 +404,10 @@ void LbfgsOn<Exec>::remember() {
   scale_ = curvature / product(change, preconditioned);
 }
 
-/// A step shorter than one that was too long: to the minimum of the parabola through the values at
-/// both its ends and the slope at the first, within a twentieth and a half of it. The first step,
-/// by steepest descent, may be a hundred times too long.
+/// A first step, by steepest descent, shorter than one that was too long, which may be by a hundred
+/// times: to the minimum of the parabola through the values at both its ends and the slope at the
+/// first, within a twentieth and a half of it. Later ones are halved: barriers are no parabolas,
+/// and steps that are too short keep a design where it is.
 template <class Exec>
 double LbfgsOn<Exec>::shortened(double step, double slope, double value) const {
   if (!std::isfinite(value)) return kShorterIfRefused * step;
@@ -446,7 +447,7 @@ int LbfgsOn<Exec>::search(double slope, bool& decreased) {
     if (std::isinf(high)) {
       step *= 2.0;
     } else {
-      step = low == 0.0 ? shortened(high, slope, tried) : 0.5 * (low + high);
+      step = low == 0.0 && pairs_.empty() ? shortened(high, slope, tried) : 0.5 * (low + high);
     }
   }
   return options_.max_evaluations_per_step;

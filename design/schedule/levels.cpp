@@ -234,7 +234,8 @@ DesignTask make_task(const Image& target, const DesignOptions& options, const Ex
   if (!task.setup.extent.none()) {
     task.limit = source_limit(task.target, task.setup, options.thickness, task.executor);
   }
-  if (options.ends_when_seen()) {
+  // Facets are told apart by their own picture, and each round leads new ones to unlit pixels.
+  if (options.ends_when_seen() && options.model != SurfaceModel::kFacet) {
     const double wavelength = wave_options(options, task.setup).wavelength;
     task.finish = Finish(picture_floor(task.target, task.setup, options.thickness, wavelength));
   }

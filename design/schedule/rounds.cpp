@@ -291,11 +291,8 @@ class Watch {
   [[nodiscard]] bool enough() const { return enough_; }      ///< and the level.
 
  private:
-  /// Rounds of facets lead new ones to unlit pixels, and those by waves have a rule of their own.
-  [[nodiscard]] bool idle() const {
-    const bool facets = site_.problem.objective.model == SurfaceModel::kFacet;
-    return !facets && !site_.level.waves && site_.task.finish.idle(errors_);
-  }
+  /// Rounds by waves have a rule of their own.
+  [[nodiscard]] bool idle() const { return !site_.level.waves && site_.task.finish.idle(errors_); }
 
   const LevelSite& site_;
   GuidedOptimization::Observer log_;

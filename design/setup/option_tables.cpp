@@ -150,8 +150,9 @@ void describe(Description& d, DesignOptions& o) {
           "for --model facet");
   d.word("--quality", o.iterations,
          {{"draft", 20}, {"standard", 100}, {"paper", DesignOptions::kPaperIterations}},
-         "maximum iterations of one round: 20, 100 or 300; draft and standard end before when what "
-         "is left is small against what diffraction and a display of 8 bits take away")
+         "maximum iterations of one round: 20, 100 or 300; draft and standard end before, but for "
+         "--model facet, when what is left is small against what diffraction and a display of 8 "
+         "bits take away")
       .essential = true;
   d.whole("--transport-rounds", o.transport_rounds, Limits::between(0, 1000),
           "rounds that begin with optimal transport; 0 starts from a flat surface");
