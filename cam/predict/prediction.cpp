@@ -252,13 +252,17 @@ Eigen::AlignedBox2d grown_within(const Eigen::AlignedBox2d& box, double beyond,
   return Eigen::AlignedBox2d(box.min() - all, box.max() + all).intersection(limits);
 }
 
-/// The rows of a raster that cross a box, cut to its length, at the same places.
+/// The rows of a raster that cross a box, cut to its length, at the same places. They begin and end
+/// within what the raster finishes: beyond that and a ball's reach there is no surface.
 RasterPlan raster_around(const RasterPlan& whole, const Eigen::AlignedBox2d& box) {
   const int across = 1 - whole.options.along;
   const double begin = whole.surface.min()[across];
   Eigen::AlignedBox2d part = box;
-  const double first = std::floor((box.min()[across] - begin) / whole.pitch);
-  const double last = std::ceil((box.max()[across] - begin) / whole.pitch);
+  const Eigen::AlignedBox2d all = whole.finished();
+  const double first = std::max(std::floor((box.min()[across] - begin) / whole.pitch),
+                                std::ceil((all.min()[across] - begin) / whole.pitch));
+  const double last = std::min(std::ceil((box.max()[across] - begin) / whole.pitch),
+                               std::floor((all.max()[across] - begin) / whole.pitch));
   part.min()[across] = begin + first * whole.pitch;
   part.max()[across] = begin + last * whole.pitch;
   RasterOptions options = whole.options;
