@@ -11,9 +11,9 @@ namespace lensforge {
 /// Maximum number of faces of the even mesh whose transport shapes the mesh. On the 512² logo
 /// 942,080 sites were not done after 11 processor minutes, 235,520 took at most 80 s.
 inline constexpr double kMaxEvenFaces = 250'000.0;
-/// The same for pictures with much black, which hold up a transport of many sites and are not ended
-/// by it: the 256² logo as a spline ends at 0.0035 after 92 processor seconds with 250,000, at
-/// 0.0030 after 57 with this; a photograph at 0.0030 after 40 and 55.
+/// The same for pictures with much black, which hold up a transport of many sites and gain nothing
+/// from it: the 256² logo as a spline ends at 0.0035 after 92 processor seconds with 250,000 faces,
+/// at 0.0030 after 57 with these; a photograph at 0.0030 after 40 and 55.
 inline constexpr double kMaxDarkFaces = 60'000.0;
 
 /// A level while its rounds run.
