@@ -146,36 +146,24 @@ DesignOptions trial_of(const DesignOptions& design, int pixels, const Eigen::Vec
   return trial;
 }
 
-/// The picture, mirrored at its edges, blurred along one axis by a Gaussian as wide as a pixel.
-Image blurred(const Image& picture, bool along_rows) {
+/// Shares of a pixel's light after a Gaussian blur as wide as a pixel.
+std::vector<double> shares_of_a_pixel() {
   constexpr int kReach = 2;  // 5 standard deviations.
   constexpr double kSigma = 1.0 / kGaussianWidth;
-  const auto inside = [](int k, int count) {
-    return std::clamp(k < 0 ? -1 - k : k >= count ? 2 * count - 1 - k : k, 0, count - 1);
-  };
-  Image result(picture.columns(), picture.rows());
-  for (int row = 0; row < picture.rows(); ++row) {
-    for (int column = 0; column < picture.columns(); ++column) {
-      double sum = 0.0;
-      double weights = 0.0;
-      for (int k = -kReach; k <= kReach; ++k) {
-        const int x = along_rows ? inside(column + k, picture.columns()) : column;
-        const int y = along_rows ? row : inside(row + k, picture.rows());
-        const double weight = std::exp(-0.5 * k * k / (kSigma * kSigma));
-        weights += weight;
-        sum += weight * picture.at(x, y);
-      }
-      result.at(column, row) = static_cast<float>(sum / weights);
-    }
+  std::vector<double> shares(kReach + 1);
+  for (int k = 0; k <= kReach; ++k) {
+    shares[static_cast<std::size_t>(k)] = std::exp(-0.5 * k * k / (kSigma * kSigma));
   }
-  return result;
+  const double all = shares[0] + 2.0 * std::accumulate(shares.begin() + 1, shares.end(), 0.0);
+  for (double& share : shares) share /= all;
+  return shares;
 }
 
 /// MAE between a picture of so many pixels and the same blurred by one pixel.
 double detail_at(const Image& picture, int longer) {
   const Eigen::Vector2i size = pixels_of({picture.columns(), picture.rows()}, longer);
   const Image target = resample(picture, size.x(), size.y());
-  return compare(blurred(blurred(target, true), false), target).mae;
+  return compare(blurred(target, shares_of_a_pixel(), Beyond::kMirrored), target).mae;
 }
 
 /// MAE of the best picture that any surface has in the light of an extended lamp; 0 for a point.

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numbers>
 
 #include "core/optics/light_path.h"
 #include "core/optics/light_source.h"
@@ -61,6 +63,79 @@ const char* blur_remedy(const std::string& cause) {
 
 bool waves_show(const std::vector<PictureBlur>& blurs) {
   return blurs[0].pixels <= kWideSource * blurs[1].pixels;
+}
+
+Image blurred(const Image& picture, std::span<const double> shares, Beyond beyond) {
+  const int reach = static_cast<int>(shares.size()) - 1;
+  const auto along = [&](const Image& from, bool rows) {
+    const int count = rows ? from.columns() : from.rows();
+    const auto light = [&](int k, int line) -> double {
+      if (k < 0 || k >= count) {
+        if (beyond == Beyond::kBlack) return 0.0;
+        k = std::clamp(k < 0 ? -1 - k : 2 * count - 1 - k, 0, count - 1);
+      }
+      return rows ? from.at(k, line) : from.at(line, k);
+    };
+    Image to(from.columns(), from.rows());
+    for (int y = 0; y < from.rows(); ++y) {
+      for (int x = 0; x < from.columns(); ++x) {
+        const int at = rows ? x : y;
+        const int line = rows ? y : x;
+        double sum = shares[0] * light(at, line);
+        for (int k = 1; k <= reach; ++k) {
+          sum += shares[static_cast<std::size_t>(k)] * (light(at - k, line) + light(at + k, line));
+        }
+        to.at(x, y) = static_cast<float>(sum);
+      }
+    }
+    return to;
+  };
+  return along(along(picture, true), false);
+}
+
+namespace {
+
+/// Standard deviation of the blur that is as bad as diffraction's, as a share of √(λ f). Lenses of
+/// 25 mm at 75 mm, 128², by waves, and what the blur predicts: a photograph with deep blacks 0.0083
+/// and 0.0084, the lake 0.0088 and 0.0103, the portrait 0.0051 and 0.0036; of 100 mm at 300 mm the
+/// photograph 0.0038 and 0.0046.
+constexpr double kDiffractionSigma = 0.2;
+
+/// That of an even disc, as a share of its diameter.
+constexpr double kDiscSigma = 0.25;
+
+/// Of a blur, pixels: more leaves nothing of a picture anyway.
+constexpr double kMaxSigma = 32.0;
+
+/// Mean error of values that are rounded to the 255 steps of a display.
+constexpr double kDisplayFloor = 0.25 / 255.0;
+
+/// Shares of a pixel's light, even over the pixel, that a Gaussian blur leaves 0, 1, 2 … pixels
+/// away. @param sigma  pixels, > 0.
+std::vector<double> pixel_shares(double sigma) {
+  const auto integral = [sigma](double x) {  // Of the normal distribution.
+    const double u = x / sigma;
+    return 0.5 * x * (1.0 + std::erf(u / std::numbers::sqrt2)) +
+           sigma * std::exp(-0.5 * u * u) / std::sqrt(2.0 * std::numbers::pi);
+  };
+  std::vector<double> shares;
+  shares.reserve(static_cast<std::size_t>(3.0 + 4.0 * sigma));
+  for (int away = 0; away < 2.0 + 4.0 * sigma; ++away) {
+    shares.push_back(integral(away + 1.0) - 2.0 * integral(away) + integral(away - 1.0));
+  }
+  return shares;
+}
+
+}  // namespace
+
+double picture_floor(const Image& target, const OpticalSetup& setup, double z, double wavelength) {
+  const std::vector<PictureBlur> blurs = light_blurs(setup, z, wavelength);
+  if (!waves_show(blurs)) return kDisplayFloor;
+  const double lamp = std::min(kDiscSigma * blurs[0].pixels, kMaxSigma);
+  const double diffraction = std::min(kDiffractionSigma * blurs[1].pixels, kMaxSigma);
+  const Image lit = lamp > 0.0 ? blurred(target, pixel_shares(lamp), Beyond::kBlack) : target;
+  const Image seen = blurred(target, pixel_shares(std::hypot(lamp, diffraction)), Beyond::kBlack);
+  return std::hypot(compare(seen, lit).mae, kDisplayFloor);
 }
 
 }  // namespace lensforge

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
+#include "core/image/image.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {
@@ -44,5 +46,19 @@ bool waves_show(const std::vector<PictureBlur>& blurs);
 
 /// At 3.4 times (the sun through a 25 mm lens at 75 mm) waves add 0.0003 to 0.0011 of MAE.
 inline constexpr double kWideSource = 3.0;
+
+/// What lies beyond the sides of a picture that is blurred.
+enum class Beyond { kBlack, kMirrored };
+
+/// The picture, blurred along rows and columns.
+/// @param shares  of a pixel's light that stay and that go 1, 2 … pixels to either side.
+Image blurred(const Image& picture, std::span<const double> shares, Beyond beyond);
+
+/// MAE between a picture and the same picture as diffraction and eight bits leave it. The light of
+/// a lens whose picture by rays has the error E ends at about √(F² + E²), F this floor: a
+/// photograph with deep blacks, 128² on 100 mm at 300 mm, has 0.0038 by waves with E = 0.0015 and
+/// 0.0042 with 0.0026.
+/// @param z  height of the surface, mm. @param wavelength  mm
+double picture_floor(const Image& target, const OpticalSetup& setup, double z, double wavelength);
 
 }  // namespace lensforge

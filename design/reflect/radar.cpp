@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/reflect/radar.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <numbers>
 #include <numeric>
 #include <string>
+#include <vector>
 
 #include "core/compute/scalar.h"
 #include "core/error.h"
@@ -26,10 +28,236 @@
 //   path    from a plane through the middle of the mesh, along the ray, and back to that plane
 
 namespace lensforge::reflect {
-namespace {
 
 using Eigen::Vector3d;
 using std::numbers::pi;
+
+// Edges
+
+// Notation, for one face of a wedge whose open angle is Nπ
+//   x, y, z  away from the edge in the face, the face's normal, x × y along the edge
+//   β        angle between the direction of incidence and z
+//   φ        angle of the radar above the face, seen along z
+//   e, h     the electric field, and the magnetic one times the impedance of free space
+//   κ        k sin β
+//   μ        rate of phase of field and observation along the grazing ray, in units of κ:
+//            cos φ − 2 cot² β; α = arccos μ
+//   a, b     (π − α)/N and φ/N
+//   U        1 if the face is lit, else 0
+//
+// With Sommerfeld's series of Bessel functions, where e_z and h_z of the incident wave are 1,
+//   ∫₀^∞ h_z e^{−iκμx} dx     = (2i/κ) (1/N) sin a / (sin α (cos a − cos b))
+//   ∫₀^∞ ∂e_z/∂y e^{−iκμx} dx = 2 (1/N) sin b / (cos a − cos b).
+// Physical optics has these integrals for N = 1, if the face is lit: −(2i/κ) U/(cos φ + μ) and
+// −2 U sin φ/(cos φ + μ). The differences are (2i/κ) p and 2 q. The current x h_z − z h_x has h_x
+// from both by the equations of Maxwell; what it radiates back with the polarization of the
+// incident field, e = e_φ φ̂ + e_β β̂, is
+//   f = p sin φ e_φ² + q e_β² − e_φ e_β cos β (p (cos φ + μ) + 1/N − U).
+
+namespace {
+
+/// Sine of the angle between sight and edge below which an edge is seen from its end: its field,
+/// finite there, is that of its end points, which this theory does not have.
+constexpr double kAlongEdge = 1e-4;
+
+/// The integrals of a face's fringe current.
+struct FringeTerms {
+  double p = 0.0;
+  double q = 0.0;
+};
+
+FringeTerms fringe_terms(double open, double phi, double mu, bool lit) {
+  const double b = phi / open;
+  double cos_a = 0.0;
+  double ratio = 1.0 / open;  // sin a/sin α
+  if (mu > -1.0) {
+    const double alpha = std::acos(std::min(mu, 1.0));
+    cos_a = std::cos((pi - alpha) / open);
+    if (alpha < pi) ratio = std::sin((pi - alpha) / open) / std::sin(alpha);
+  } else {
+    const double c = std::acosh(-mu);  // π − α = −i c
+    cos_a = std::cosh(c / open);
+    if (c > 0.0) ratio = std::sinh(c / open) / std::sinh(c);
+  }
+  const double wedge = 1.0 / (open * (cos_a - std::cos(b)));
+  const double optics = lit ? 1.0 / (std::cos(phi) + mu) : 0.0;
+  return {ratio * wedge + optics, std::sin(b) * wedge + std::sin(phi) * optics};
+}
+
+/// Both terms are smooth where the wedge's current and that of physical optics have a common pole,
+/// but their difference loses digits there: within kPole of it they are means of both sides, whose
+/// error is of the order of kAside².
+FringeTerms smooth_fringe_terms(double open, double phi, double mu, bool lit) {
+  constexpr double kPole = 1e-4;
+  constexpr double kAside = 0.01;
+  const double pole = -std::cos(phi);
+  if (!lit || std::abs(mu - pole) > kPole) return fringe_terms(open, phi, mu, lit);
+  const double alpha = pi - phi;  // Even and 2π-periodic.
+  const FringeTerms one = fringe_terms(open, phi, std::cos(alpha - kAside), lit);
+  const FringeTerms other = fringe_terms(open, phi, std::cos(alpha + kAside), lit);
+  return {0.5 * (one.p + other.p), 0.5 * (one.q + other.q)};
+}
+
+double face_fringe(const WedgeFace& face, double open, const Vector3d& towards,
+                   const Vector3d& polarization) {
+  /// Angle above the face below which p is that at this angle: it grows without bound at 0, its
+  /// product with sin φ does not.
+  constexpr double kGrazing = 1e-6;
+  const Vector3d along = face.out.cross(face.normal);
+  const double cos_beta = -towards.dot(along);
+  const double sin_beta = std::hypot(towards.dot(face.out), towards.dot(face.normal));
+  if (sin_beta < kAlongEdge) return 0.0;
+  double phi = std::atan2(towards.dot(face.normal), towards.dot(face.out));
+  const Vector3d phi_hat = std::cos(phi) * face.normal - std::sin(phi) * face.out;
+  const double e_phi = polarization.dot(phi_hat);
+  const double e_beta = polarization.dot(towards.cross(phi_hat));
+  if (phi < 0.0) phi += 2.0 * pi;
+  if (phi > open * pi) return 0.0;
+  phi = std::clamp(phi, kGrazing, 2.0 * pi - kGrazing);
+  const bool lit = phi < pi;
+  const double mu = std::cos(phi) - 2.0 * std::pow(cos_beta / sin_beta, 2);
+  const auto [p, q] = smooth_fringe_terms(open, phi, mu, lit);
+  return p * std::sin(phi) * e_phi * e_phi + q * e_beta * e_beta -
+         e_phi * e_beta * cos_beta * (p * (std::cos(phi) + mu) + 1.0 / open - (lit ? 1.0 : 0.0));
+}
+
+WedgeFace wedge_face(const SurfaceMesh& mesh, int face, const Vector3d& from,
+                     const Vector3d& along) {
+  const Corners c = mesh.corners(face);
+  const Vector3d inner = (c.v0 + c.v1 + c.v2) / 3.0 - from;
+  return {(inner - inner.dot(along) * along).normalized(), area_normal(c).normalized()};
+}
+
+/// Angle by which a mesh's faces turn at an edge from which it is one for radar, rad.
+double least_turn(const SurfaceMesh& mesh, const Edge& edge, double length, double wavelength) {
+  constexpr double kAlwaysSharp = 40.0 * kDegree;
+  const double areas = area_normal(mesh, edge.left).norm() + area_normal(mesh, edge.right).norm();
+  const double height = 0.5 * areas / length;
+  return std::min(kAlwaysSharp, 0.5 * wavelength / height);
+}
+
+}  // namespace
+
+double edge_fringe(const RadarEdge& edge, const Vector3d& towards, const Vector3d& polarization) {
+  return face_fringe(edge.faces[0], edge.open, towards, polarization) +
+         face_fringe(edge.faces[1], edge.open, towards, polarization);
+}
+
+std::vector<RadarEdge> radar_edges(const SurfaceMesh& mesh, double wavelength) {
+  std::vector<RadarEdge> edges;
+  for (const Edge& edge : make_edges(mesh).edges) {
+    RadarEdge radar{
+        mesh.vertices.col(edge.from), mesh.vertices.col(edge.to), {}, 2.0, {edge.from, edge.to}};
+    const double length = (radar.to - radar.from).norm();
+    const Vector3d along = (radar.to - radar.from) / length;
+    const WedgeFace left = wedge_face(mesh, edge.left, radar.from, along);
+    radar.faces = {left, {left.out, -left.normal}};
+    if (edge.right >= 0) {
+      const WedgeFace right = wedge_face(mesh, edge.right, radar.from, along);
+      const double turn = std::acos(std::clamp(left.normal.dot(right.normal), -1.0, 1.0));
+      const bool convex = right.out.dot(left.normal) < 0.0;
+      if (!convex || turn < least_turn(mesh, edge, length, wavelength)) continue;
+      radar.faces[1] = right;
+      radar.open = 1.0 + turn / pi;
+    }
+    edges.push_back(radar);
+  }
+  return edges;
+}
+
+// Faces of surfaces that bend
+
+namespace {
+
+using Complex = std::complex<double>;
+
+/// Above this kρ both shares differ from 1 by less than 1 %, and the surface counts as flat.
+constexpr double kLargeRadius = 50.0;
+
+/// ∫_τ^∞ e^{iu²} du e^{−iτ²} along u = τ + e^{iπ/4} s, where the integrand decays as e^{−s²}:
+/// Simpson's rule, error below 1e-8.
+Complex fresnel_tail(double tau) {
+  constexpr int kSteps = 200;
+  const double step = std::min(6.0, 20.0 / tau) / kSteps;
+  const Complex rate = std::numbers::sqrt2 * tau * Complex(-1.0, 1.0);
+  Complex sum = 0.0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double s = i * step;
+    const double weight = i == 0 || i == kSteps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
+    sum += weight * std::exp(rate * s - s * s);
+  }
+  return std::polar(step / 3.0, 0.25 * pi) * sum;
+}
+
+ParabolicShares shares_of(double curvature, double wave_number) {
+  if (curvature * kLargeRadius <= wave_number) return {1.0, 1.0};
+  return parabolic_shares(wave_number / curvature);
+}
+
+/// Least squares of the second fundamental form (a, b; b, c) over the sides of a face.
+Eigen::Matrix2d second_form(const Corners& c, const std::array<Vector3d, 3>& normal,
+                            const Vector3d& u, const Vector3d& v) {
+  const std::array p{c.v0, c.v1, c.v2};
+  Eigen::Matrix<double, 6, 3> rows = Eigen::Matrix<double, 6, 3>::Zero();
+  Eigen::Matrix<double, 6, 1> turns;
+  for (int k = 0; k < 3; ++k) {
+    const auto from = static_cast<std::size_t>(k);
+    const auto to = static_cast<std::size_t>((k + 1) % 3);
+    const Vector3d side = p[to] - p[from];
+    const Vector3d turn = normal[to] - normal[from];
+    rows.row(2 * k) << side.dot(u), side.dot(v), 0.0;
+    rows.row(2 * k + 1) << 0.0, side.dot(u), side.dot(v);
+    turns.segment<2>(2 * k) << turn.dot(u), turn.dot(v);
+  }
+  const Vector3d form = rows.colPivHouseholderQr().solve(turns);
+  return (Eigen::Matrix2d() << form[0], form[1], form[1], form[2]).finished();
+}
+
+}  // namespace
+
+ParabolicShares parabolic_shares(double k_rho) {
+  const double tau = std::sqrt(k_rho);
+  const Complex w = Complex(0.0, -2.0 * tau) * fresnel_tail(tau);
+  return {1.0 / w, 1.0 / (2.0 - w)};
+}
+
+Complex CurvedFace::of(const Vector3d& polarization, const Vector3d& n) const {
+  const double a = polarization.dot(along);
+  const double b = polarization.dot(n.cross(along));
+  const double both = a * a + b * b;
+  return both > 0.0 ? (a * a * share + b * b * other) / both : 1.0;
+}
+
+std::vector<CurvedFace> curved_faces(const SurfaceMesh& mesh, const std::vector<bool>& creased,
+                                     double wavelength) {
+  const Eigen::Matrix3Xd normals = vertex_area_normals(mesh).colwise().normalized();
+  const double wave_number = 2.0 * pi / wavelength;
+  std::vector<CurvedFace> faces;
+  for (std::int64_t k = 0; k < mesh.triangle_count(); ++k) {
+    const Eigen::Vector3i corner = mesh.triangles.col(k);
+    CurvedFace face{Vector3d::UnitX(), 1.0, 1.0};
+    const bool smooth = std::none_of(corner.begin(), corner.end(),
+                                     [&](int v) { return creased[static_cast<std::size_t>(v)]; });
+    if (smooth) {
+      const Vector3d n = area_normal(mesh, k).normalized();
+      const Vector3d u = n.unitOrthogonal();
+      const Vector3d v = n.cross(u);
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> principal(second_form(
+          mesh.corners(k), {normals.col(corner[0]), normals.col(corner[1]), normals.col(corner[2])},
+          u, v));
+      const ParabolicShares one = shares_of(principal.eigenvalues()[0], wave_number);
+      const ParabolicShares two = shares_of(principal.eigenvalues()[1], wave_number);
+      const Eigen::Vector2d axis = principal.eigenvectors().col(0);
+      face = {axis[0] * u + axis[1] * v, one.across * two.along, one.along * two.across};
+    }
+    faces.push_back(face);
+  }
+  return faces;
+}
+
+// The body: faces, edges and bounces
+
+namespace {
 
 constexpr double kTubesPerWavelength = 10.0;
 constexpr int kBounces = 3;

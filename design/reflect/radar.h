@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <complex>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
@@ -11,8 +12,6 @@
 #include "core/compute/executor.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/reflect/mesh/faces.h"
-#include "design/reflect/radar_curvature.h"
-#include "design/reflect/radar_edges.h"
 #include "design/reflect/reflect_shape.h"
 
 namespace lensforge::reflect {
@@ -22,6 +21,79 @@ inline constexpr double kMaxRadarRays = 4e6;
 
 /// @throw InputError naming --radar if a direction takes more than kMaxRadarRays.
 void require_radar_size(const SurfaceMesh& mesh, double wavelength);
+
+// Edges.
+
+/// A face of a wedge, as long as wanted.
+struct WedgeFace {
+  Eigen::Vector3d out;     ///< Unit; in the face, from the edge and perpendicular to it.
+  Eigen::Vector3d normal;  ///< Unit; away from the material.
+};
+
+/// A straight edge of a perfectly conducting body.
+struct RadarEdge {
+  Eigen::Vector3d from;
+  Eigen::Vector3d to;
+  std::array<WedgeFace, 2> faces;
+  double open = 2.0;  ///< Angle outside of the material in units of π: 2 for the rim of a sheet.
+  std::array<int, 2> vertices{};  ///< Of the mesh: its ends.
+};
+
+/// The field that an edge adds to physical optics, per length of edge and for monostatic radar: the
+/// sum of physical optics, Σ (n·ω) ∫ e^{−2ikω·r} dA, grows by (i/k) f ∫ e^{−2ikω·r} dl with this f.
+///
+/// It is the far field of the fringe current on both faces, the exact current of the wedge
+/// (Sommerfeld's series) without that of physical optics, integrated from the edge along the
+/// diffracted ray that grazes the face, as in A. Michaeli, "Elimination of infinities in equivalent
+/// edge currents, part I: fringe current components", IEEE Trans. Antennas Propag. 34(7), 1986.
+/// This is the contribution of Ufimtsev's elementary edge waves and, up to the direction in which
+/// the current is integrated, of Mitzner's incremental length diffraction coefficients.
+/// @param towards       unit vector to the radar.
+/// @param polarization  unit vector of the electric field sent and received, perpendicular to it.
+/// @return 0 for directions inside the material, and along the edge.
+double edge_fringe(const RadarEdge& edge, const Eigen::Vector3d& towards,
+                   const Eigen::Vector3d& polarization);
+
+/// The edges of a mesh that radar sees as such: boundaries, and convex edges whose faces turn by
+/// more than λ/(2 h), where h is the mean height of both faces above the edge, or by more than 40°.
+/// Faces that turn by less follow a smooth surface to λ/16, which is why their edges are none.
+/// Concave edges add nothing of first order beside the light of two bounces.
+/// @pre vertices in the same place are merged.
+std::vector<RadarEdge> radar_edges(const SurfaceMesh& mesh, double wavelength);
+
+// Faces of surfaces that bend.
+
+/// The field that a parabolic cylinder of perfect conductor sends straight back from its vertex, as
+/// a share of what physical optics and geometrical optics give, which agree there: the exact
+/// solution of H. Lamb, "On Sommerfeld's diffraction problem; and on reflection by a parabolic
+/// mirror", Proc. London Math. Soc. s2-4, 190-203, 1907. With w = −2iτ e^{−iτ²} ∫_τ^∞ e^{iu²} du
+/// and τ² = kρ it is 1/w for an electric field along the cylinder and 1/(2 − w) across. Both go to
+/// 1 for large kρ; for ρ = 0 they are the edge of a half-plane.
+/// @param k_rho  wave number times radius of curvature at the vertex, > 0.
+struct ParabolicShares {
+  std::complex<double> along;
+  std::complex<double> across;
+};
+ParabolicShares parabolic_shares(double k_rho);
+
+/// How much more or less than physical optics a face of a curved surface sends back: 1 for a flat
+/// one, for a cylinder the share of the parabolic one with its radius, seen from outside. For two
+/// curvatures the shares are multiplied.
+struct CurvedFace {
+  Eigen::Vector3d along;       ///< Unit; direction of one principal curvature.
+  std::complex<double> share;  ///< For the electric field in this direction.
+  std::complex<double> other;  ///< For the electric field across.
+
+  /// The share of the field sent and received with this polarization; n is the face's normal.
+  [[nodiscard]] std::complex<double> of(const Eigen::Vector3d& polarization,
+                                        const Eigen::Vector3d& n) const;
+};
+
+/// Of every face of a mesh, by the turns of the normals at its corners (Rusinkiewicz 2004). Faces
+/// are flat where they are concave, and where they touch one of these vertices.
+/// @param creased  a flag per vertex, set where the surface is not smooth.
+std::vector<CurvedFace> curved_faces(const SurfaceMesh& mesh, const std::vector<bool>& creased,
+                                     double wavelength);
 
 /// A perfectly conducting shape in the waves of a radar.
 class RadarBody {

@@ -252,7 +252,7 @@ void DesignLog::ended_early(const std::string& step, const std::string& why) {
       "; " + step + " of round " + std::to_string(state_.round + 1) + " ended early (" + why + ")";
 }
 
-void DesignLog::good_enough() { remark_ = ", the wall shows no more (--quality paper goes on)"; }
+void DesignLog::good_enough() { remark_ += ", the wall shows no more (--quality paper goes on)"; }
 
 void DesignLog::report_step(const std::string& what) const {
   if (task_.options.resume && !iterated_) {

@@ -12,6 +12,7 @@
 #include "core/lens/smooth_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/light_path.h"
+#include "core/optics/picture_blur.h"
 #include "core/spline/control_net.h"
 #include "design/schedule/face_transport.h"
 #include "design/setup/design_options.h"
@@ -216,6 +217,30 @@ std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOption
 Image working_picture(const Image& target, const DesignOptions& options, const RunControl& run) {
   const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
   return resample(target, pixels.x(), pixels.y(), run);
+}
+
+namespace {
+
+/// Share of the floor by which the wall's error may be above it, and largest goal: most pixels are
+/// then within one step of a display.
+constexpr double kMayAdd = 0.1;
+constexpr double kLargestGoal = 0.003;
+
+/// A level is idle if the wall's error falls by less than this share in so many iterations. In ten
+/// it may rise, because the objective is not the MAE: a 128² logo as a smooth mesh ended at 0.0044.
+constexpr double kIdleShare = 0.01;
+constexpr std::size_t kIdleWindow = 20;
+
+}  // namespace
+
+double Finish::goal() const {
+  return std::min(floor_ * std::sqrt((1.0 + kMayAdd) * (1.0 + kMayAdd) - 1.0), kLargestGoal);
+}
+
+bool Finish::idle(std::span<const double> errors) const {
+  if (floor_ == 0.0 || errors.size() <= kIdleWindow) return false;
+  const double before = std::hypot(floor_, errors[errors.size() - 1 - kIdleWindow]);
+  return std::hypot(floor_, errors.back()) > (1.0 - kIdleShare) * before;
 }
 
 DesignTask make_task(const Image& target, const DesignOptions& options, const Executor& executor,

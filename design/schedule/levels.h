@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/compute/executor.h"
@@ -13,7 +14,6 @@
 #include "core/spline/control_net.h"
 #include "design/energy/objective_options.h"
 #include "design/render/source_picture.h"
-#include "design/schedule/finish.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/setup/design_options.h"
 
@@ -57,6 +57,25 @@ SurfaceModel default_model(const Eigen::Vector2i& pixels, const DesignOptions& o
 /// to undo the polish, and it is optimised longer. Where LightOptions::model asks for waves,
 /// a last level follows their picture from there.
 std::vector<Level> plan_levels(const Eigen::Vector2i& pixels, const DesignOptions& options);
+
+/// When iterations are enough: their error is then small against the floor of the picture.
+class Finish {
+ public:
+  /// Goes on to the last iteration.
+  Finish() = default;
+  /// @param floor  picture_floor(), > 0.
+  explicit Finish(double floor) : floor_(floor) {}
+
+  /// MAE with which the wall's error is a tenth above the floor, at most 0.003; 0 without a floor.
+  [[nodiscard]] double goal() const;
+
+  /// True if the latest iterations have lowered the wall's error so little that more are in vain.
+  /// @param errors  MAE after each iteration.
+  [[nodiscard]] bool idle(std::span<const double> errors) const;
+
+ private:
+  double floor_ = 0.0;
+};
 
 /// A design's input at full size; no step changes it.
 struct DesignTask {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/radar_curvature.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <numbers>
 
 #include "design/reflect/mesh/faces.h"
-#include "design/reflect/radar_edges.h"
+#include "design/reflect/radar.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

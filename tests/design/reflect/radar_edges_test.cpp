@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/reflect/radar_edges.h"
-
 #include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
@@ -8,6 +6,7 @@
 #include <numbers>
 
 #include "core/compute/scalar.h"
+#include "design/reflect/radar.h"
 #include "fixtures/shapes/shapes.h"
 
 namespace lensforge::reflect {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/finish.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include "core/image/image.h"
 #include "core/optics/picture_blur.h"
 #include "design/design.h"
+#include "design/schedule/levels.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
@@ -42,23 +41,22 @@ Image blurred_by_force(const Image& picture, double sigma) {
     for (double& value : result) value /= all;
     return result;
   };
-  Image half(side, side);
-  for (int y = 0; y < side; ++y) {
-    std::vector<double> line(static_cast<std::size_t>(side));
-    for (int x = 0; x < side; ++x) line[static_cast<std::size_t>(x)] = picture.at(x, y);
-    line = one_way(line);
-    for (int x = 0; x < side; ++x)
-      half.at(x, y) = static_cast<float>(line[static_cast<std::size_t>(x)]);
-  }
-  Image result(side, side);
-  for (int x = 0; x < side; ++x) {
-    std::vector<double> line(static_cast<std::size_t>(side));
-    for (int y = 0; y < side; ++y) line[static_cast<std::size_t>(y)] = half.at(x, y);
-    line = one_way(line);
-    for (int y = 0; y < side; ++y)
-      result.at(x, y) = static_cast<float>(line[static_cast<std::size_t>(y)]);
-  }
-  return result;
+  const auto along = [&](const Image& from, bool rows) {
+    Image to(side, side);
+    for (int line = 0; line < side; ++line) {
+      std::vector<double> values(static_cast<std::size_t>(side));
+      for (int k = 0; k < side; ++k) {
+        values[static_cast<std::size_t>(k)] = rows ? from.at(k, line) : from.at(line, k);
+      }
+      values = one_way(values);
+      for (int k = 0; k < side; ++k) {
+        float& value = rows ? to.at(k, line) : to.at(line, k);
+        value = static_cast<float>(values[static_cast<std::size_t>(k)]);
+      }
+    }
+    return to;
+  };
+  return along(along(picture, true), false);
 }
 
 TEST(PictureFloor, IsTheErrorOfABlurOfAFifthOfDiffraction) {
