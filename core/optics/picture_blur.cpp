@@ -71,7 +71,7 @@ Image blurred(const Image& picture, std::span<const double> shares, Beyond beyon
     const int count = rows ? from.columns() : from.rows();
     const auto light = [&](int k, int line) -> double {
       if (k < 0 || k >= count) {
-        if (beyond == Beyond::kBlack) return 0.0;
+        if (beyond == Beyond::kDark) return 0.0;
         k = std::clamp(k < 0 ? -1 - k : 2 * count - 1 - k, 0, count - 1);
       }
       return rows ? from.at(k, line) : from.at(line, k);
@@ -133,8 +133,8 @@ double picture_floor(const Image& target, const OpticalSetup& setup, double z, d
   if (!waves_show(blurs)) return kDisplayFloor;
   const double lamp = std::min(kDiscSigma * blurs[0].pixels, kMaxSigma);
   const double diffraction = std::min(kDiffractionSigma * blurs[1].pixels, kMaxSigma);
-  const Image lit = lamp > 0.0 ? blurred(target, pixel_shares(lamp), Beyond::kBlack) : target;
-  const Image seen = blurred(target, pixel_shares(std::hypot(lamp, diffraction)), Beyond::kBlack);
+  const Image lit = lamp > 0.0 ? blurred(target, pixel_shares(lamp), Beyond::kDark) : target;
+  const Image seen = blurred(target, pixel_shares(std::hypot(lamp, diffraction)), Beyond::kDark);
   return std::hypot(compare(seen, lit).mae, kDisplayFloor);
 }
 

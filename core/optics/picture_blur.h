@@ -48,7 +48,7 @@ bool waves_show(const std::vector<PictureBlur>& blurs);
 inline constexpr double kWideSource = 3.0;
 
 /// What lies beyond the sides of a picture that is blurred.
-enum class Beyond { kBlack, kMirrored };
+enum class Beyond { kDark, kMirrored };
 
 /// The picture, blurred along rows and columns.
 /// @param shares  of a pixel's light that stay and that go 1, 2 … pixels to either side.
