@@ -135,14 +135,10 @@ namespace {
 /// Finds the parameters of one node after another: each search begins where the last one ended.
 class SplineRow {
  public:
-  explicit SplineRow(const ControlNet& net) : net_(net) {}
+  /// @param start  parameters near the first node.
+  SplineRow(const ControlNet& net, const Eigen::Vector2d& start) : net_(net), uv_(start) {}
 
   [[nodiscard]] SurfacePoint at(const Eigen::Vector2d& xy) {
-    if (!begun_) {
-      const Eigen::Vector2d size(net_.points.row(0).maxCoeff(), net_.points.row(1).maxCoeff());
-      uv_ = xy.cwiseQuotient(size).cwiseProduct(net_.cells().cast<double>());
-      begun_ = true;
-    }
     uv_ = net_.parameters_of(xy, uv_);
     const SurfaceShape shape = net_.at(uv_).shape();
     return {shape.z, shape.slope};
@@ -150,8 +146,7 @@ class SplineRow {
 
  private:
   const ControlNet& net_;
-  Eigen::Vector2d uv_ = Eigen::Vector2d::Zero();
-  bool begun_ = false;
+  Eigen::Vector2d uv_;
 };
 
 }  // namespace
@@ -171,7 +166,10 @@ void OpticalField::sample(const GridWindow& window, const Executor& executor,
   };
   const auto sample_row = [&](std::int64_t j) {
     if (spline != nullptr) {
-      SplineRow row(spline->net());
+      // Where the first node is if knots are even.
+      const Eigen::AlignedBox2d& box = surface_.box();
+      const Eigen::Vector2d share = nearest_inside(box, window.node(0, j)).cwiseQuotient(box.max());
+      SplineRow row(spline->net(), share.cwiseProduct(spline->net().cells().cast<double>()));
       return fill_row(j, [&](const Eigen::Vector2d& xy) { return row.at(xy); });
     }
     fill_row(j, [&](const Eigen::Vector2d& xy) {

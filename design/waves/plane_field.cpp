@@ -29,18 +29,38 @@ std::mutex& planning() {
   return mutex;
 }
 
-void transform(std::vector<std::complex<float>>& values, int columns, int rows, int sign) {
-  // std::complex has the layout of two numbers ([complex.numbers.general]).
-  auto* const data = reinterpret_cast<fftwf_complex*>(values.data());  // NOLINT(*-reinterpret-cast)
-  fftwf_plan plan = nullptr;
-  {
+/// The transform of one row or column in its place.
+class LineTransform {
+ public:
+  /// @param size  even, so that every row of values is aligned as the first is.
+  LineTransform(int size, int sign) {
+    std::vector<std::complex<float>> line(static_cast<std::size_t>(size));
     const std::lock_guard lock(planning());
-    plan = fftwf_plan_dft_2d(rows, columns, data, data, sign, FFTW_ESTIMATE);
+    plan_ =
+        fftwf_plan_dft_1d(size, data_of(line.data()), data_of(line.data()), sign, FFTW_ESTIMATE);
   }
-  fftwf_execute(plan);
-  const std::lock_guard lock(planning());
-  fftwf_destroy_plan(plan);
-}
+  LineTransform(const LineTransform&) = delete;
+  LineTransform& operator=(const LineTransform&) = delete;
+  ~LineTransform() {
+    const std::lock_guard lock(planning());
+    fftwf_destroy_plan(plan_);
+  }
+
+  void run(std::complex<float>* line) const {
+    fftwf_execute_dft(plan_, data_of(line), data_of(line));
+  }
+
+ private:
+  /// std::complex has the layout of two numbers ([complex.numbers.general]).
+  static fftwf_complex* data_of(std::complex<float>* values) {
+    return reinterpret_cast<fftwf_complex*>(values);  // NOLINT(*-reinterpret-cast)
+  }
+
+  fftwf_plan plan_ = nullptr;
+};
+
+/// Columns that are transformed at once: a line of the cache holds a value of each.
+constexpr int kColumns = 8;
 
 /// e^{2πi t} of many t at once; most of the work of laying and propagating fields.
 class UnitPhases {
@@ -226,12 +246,13 @@ void PlaneField::cover(const std::array<Vertex, 3>& vertices) {
 /// A triangle's field goes on beyond its sides as a quadratic. Where a surface has detail finer
 /// than a cell that is wrong by some percent, so only cells without another have it.
 template <class Take>
-void PlaneField::for_each_node(const std::array<Vertex, 3>& vertices, const Take& take) const {
+void PlaneField::for_each_node(const std::array<Vertex, 3>& vertices, Where where,
+                               const Take& take) const {
   const LaidTriangle triangle(plan_, vertices);
   const double all = plan_.points.prod();
   for_each_cell(plan_, triangle, [&](int i, int j, std::size_t node) {
     double share = 0.0;
-    if (lit_.empty()) {
+    if (where == Where::kInside) {
       share = triangle.contains(i, j) ? 1.0 : 0.0;
     } else if ((lit_[node] & kCentre) == 0) {
       share = triangle.points_inside(plan_.points, i, j) / all;
@@ -245,8 +266,8 @@ void PlaneField::for_each_node(const std::array<Vertex, 3>& vertices, const Take
   });
 }
 
-void PlaneField::add(const std::array<Vertex, 3>& vertices) {
-  for_each_node(vertices, [&](std::size_t node, const LaidTriangle::Field& field) {
+void PlaneField::add(const std::array<Vertex, 3>& vertices, Where where) {
+  for_each_node(vertices, where, [&](std::size_t node, const LaidTriangle::Field& field) {
     pending_.node.push_back(node);
     pending_.turns.push_back(field.turns);
     pending_.amplitude.push_back(static_cast<float>(field.amplitude));
@@ -263,9 +284,9 @@ void PlaneField::lay_rest() {
   pending_.clear();
 }
 
-void PlaneField::gather(const std::array<Vertex, 3>& vertices,
+void PlaneField::gather(const std::array<Vertex, 3>& vertices, Where where,
                         const std::array<std::size_t, 3>& vertex, std::span<double> by_path) {
-  for_each_node(vertices, [&](std::size_t node, const LaidTriangle::Field& field) {
+  for_each_node(vertices, where, [&](std::size_t node, const LaidTriangle::Field& field) {
     pending_.node.push_back(node);
     pending_.turns.push_back(field.turns);
     pending_.amplitude.push_back(static_cast<float>(field.amplitude));
@@ -297,9 +318,9 @@ void PlaneField::propagate() {
 void PlaneField::return_back() { go(true); }
 
 /// A component with the direction s turns by −k D s² / 2m, m the magnification (Sziklas and
-/// Siegman, Applied Optics 14, 1975); the adjoint turns it back.
+/// Siegman, Applied Optics 14, 1975); the adjoint turns it back. Columns go there and back at once,
+/// and rows without light only back.
 void PlaneField::go(bool back) {
-  transform(values_, plan_.columns, plan_.rows, FFTW_FORWARD);
   const Eigen::Vector2d way = plan_.distance * plan_.magnification.cwiseInverse();
   UnitPhases phases;
   const auto factors = [&](int count, int axis, double scale) {
@@ -318,12 +339,50 @@ void PlaneField::go(bool back) {
   };
   const auto along_x = factors(plan_.columns, 0, 1.0 / static_cast<double>(values_.size()));
   const auto along_y = factors(plan_.rows, 1, 1.0);
+  transform_rows(FFTW_FORWARD);
+  turn_columns(along_x, along_y);
+  transform_rows(FFTW_BACKWARD);
+}
+
+void PlaneField::transform_rows(int sign) {
+  const LineTransform transform(plan_.columns, sign);
   for (int j = 0; j < plan_.rows; ++j) {
     std::complex<float>* const row = &at(0, j);
-    const std::complex<float> of_row = along_y[static_cast<std::size_t>(j)];
-    for (std::size_t i = 0; i < along_x.size(); ++i) row[i] *= of_row * along_x[i];
+    const auto is_dark = [](const std::complex<float>& value) { return value == 0.0F; };
+    if (!std::all_of(row, row + plan_.columns, is_dark)) transform.run(row);
   }
-  transform(values_, plan_.columns, plan_.rows, FFTW_BACKWARD);
+}
+
+void PlaneField::turn_columns(const std::vector<std::complex<float>>& along_x,
+                              const std::vector<std::complex<float>>& along_y) {
+  const LineTransform forward(plan_.rows, FFTW_FORWARD);
+  const LineTransform backward(plan_.rows, FFTW_BACKWARD);
+  const auto rows = static_cast<std::size_t>(plan_.rows);
+  std::vector<std::complex<float>> held(kColumns * rows);
+  for (int first = 0; first < plan_.columns; first += kColumns) {
+    const int count = std::min(kColumns, plan_.columns - first);
+    const auto each = [&](const auto& action) {
+      for (int j = 0; j < plan_.rows; ++j) {
+        for (int k = 0; k < count; ++k) {
+          action(held[static_cast<std::size_t>(k) * rows + static_cast<std::size_t>(j)],
+                 at(first + k, j));
+        }
+      }
+    };
+    each([](std::complex<float>& mine, const std::complex<float>& node) { mine = node; });
+    for (int k = 0; k < count; ++k) {
+      std::complex<float>* const column = &held[static_cast<std::size_t>(k) * rows];
+      const std::complex<float> of_column = along_x[static_cast<std::size_t>(first + k)];
+      if (of_column == 0.0F) {
+        std::fill_n(column, rows, 0.0F);
+        continue;
+      }
+      forward.run(column);
+      for (std::size_t j = 0; j < rows; ++j) column[j] *= along_y[j] * of_column;
+      backward.run(column);
+    }
+    each([](const std::complex<float>& mine, std::complex<float>& node) { node = mine; });
+  }
 }
 
 PlaneField::Vertex laid_ray(const FieldPlan& plan, const PlaneField::Vertex& ray) {
@@ -341,6 +400,12 @@ PlaneField::Vertex laid_ray(const FieldPlan& plan, const PlaneField::Vertex& ray
 
 namespace {
 
+/// Floor of a number that an int holds; std::floor() is a call on processors of 2003.
+int floor_of(double x) {
+  const int whole = static_cast<int>(x);
+  return x < whole ? whole - 1 : whole;
+}
+
 /// How a field's nodes lie on pixels: each has a cell that is spread over those it touches.
 class NodesOnPixels {
  public:
@@ -349,7 +414,9 @@ class NodesOnPixels {
         step_(plan.magnification.cwiseProduct(plan.step)),
         middle_(plan.middle()),
         divergence_(plan.divergence()),
-        cell_((to.by_mm * step_.asDiagonal()).cwiseAbs().rowwise().sum()) {
+        cell_((to.by_mm * step_.asDiagonal()).cwiseAbs().rowwise().sum()),
+        along_(step_.x() *
+               (Eigen::ArrayXd::LinSpaced(plan.columns, 0.0, plan.columns - 1) - middle_.x())) {
     Eigen::AlignedBox2d box;
     for (const int j : {0, plan.rows / 2, plan.rows}) {
       for (const int i : {0, plan.columns / 2, plan.columns}) box.extend(lands(i, j));
@@ -364,24 +431,34 @@ class NodesOnPixels {
   [[nodiscard]] bool none() const { return low.x() >= high.x() || low.y() >= high.y(); }
   [[nodiscard]] int columns() const { return high.x() - low.x(); }
 
-  /// Calls `take(number, share)` for the pixels that a node's cell touches; numbers count from
-  /// `low`, row by row.
+  /// Goes to a row of nodes: where their cells begin, a row at a time, is most of the work.
+  void go_to(int j) {
+    const double across = (j - middle_.y()) * step_.y();
+    const double wider = divergence_.y() * across;
+    way_ = -(to_.tilt.x() * along_ + to_.tilt.y() * across) /
+           (1.0 + (to_.tilt.x() * divergence_.x() * along_ + to_.tilt.y() * wider));
+    const auto moved_along = along_ + way_ * divergence_.x() * along_;
+    const auto moved_across = across + way_ * wider;
+    const Eigen::Vector2d from = to_.centre - 0.5 * cell_;
+    x_ = from.x() + to_.by_mm(0, 0) * moved_along + to_.by_mm(0, 1) * moved_across;
+    y_ = from.y() + to_.by_mm(1, 0) * moved_along + to_.by_mm(1, 1) * moved_across;
+  }
+
+  /// Calls `take(number, share)` for the pixels that the cell of the row's node touches; numbers
+  /// count from `low`, row by row.
   template <class Take>
-  void for_each_pixel(int i, int j, const Take& take) const {
+  void for_each_pixel(int i, const Take& take) const {
+    const double x = x_[i], y = y_[i];
+    const int column = floor_of(x), row = floor_of(y);
     // Most cells touch one pixel.
-    const Eigen::Vector2d from = lands(i, j) - 0.5 * cell_;
-    const Eigen::Vector2d to = from + cell_;
-    const Eigen::Vector2d pixel = from.array().floor();
-    if ((to.array() < pixel.array() + 1.0).all()) {
-      const Eigen::Vector2i at = pixel.cast<int>();
-      if ((at.array() >= low.array()).all() && (at.array() < high.array()).all()) {
-        take(number(at.x(), at.y()), 1.0);
+    if (x + cell_.x() < column + 1.0 && y + cell_.y() < row + 1.0) {
+      if (column >= low.x() && column < high.x() && row >= low.y() && row < high.y()) {
+        take(number(column, row), 1.0);
       }
       return;
     }
-    touched(1, from.y(), to.y(), [&](int row, double of_row) {
-      touched(0, from.x(), to.x(),
-              [&](int column, double of_column) { take(number(column, row), of_row * of_column); });
+    touched(1, y, [&](int r, double of_row) {
+      touched(0, x, [&](int c, double of_column) { take(number(c, r), of_row * of_column); });
     });
   }
 
@@ -400,9 +477,10 @@ class NodesOnPixels {
 
   /// Pixels that a cell touches along one axis, and its share in each.
   template <class Take>
-  void touched(int axis, double from, double to, const Take& take) const {
-    for (int pixel = std::max(low[axis], static_cast<int>(std::floor(from)));
-         pixel < high[axis] && pixel < to; ++pixel) {
+  void touched(int axis, double from, const Take& take) const {
+    const double to = from + cell_[axis];
+    for (int pixel = std::max(low[axis], floor_of(from)); pixel < high[axis] && pixel < to;
+         ++pixel) {
       const double share =
           (std::min(to, pixel + 1.0) - std::max(from, double(pixel))) / cell_[axis];
       if (share > 0.0) take(pixel, share);
@@ -413,12 +491,15 @@ class NodesOnPixels {
   Eigen::Vector2d step_;  ///< Of the nodes where they land, mm.
   Eigen::Vector2d middle_, divergence_;
   Eigen::Vector2d cell_;  ///< Pixels.
+  Eigen::ArrayXd along_;  ///< Of the nodes of a row from the middle, mm.
+  Eigen::ArrayXd way_;
+  Eigen::ArrayXd x_, y_;  ///< Where the cells of a row begin, pixel coordinates.
 };
 
 }  // namespace
 
 PixelLight PlaneField::spread(const OnPicture& to) const {
-  const NodesOnPixels on(plan_, to);
+  NodesOnPixels on(plan_, to);
   PixelLight result;
   if (on.none()) return result;
   result.first = on.low;
@@ -428,18 +509,19 @@ PixelLight PlaneField::spread(const OnPicture& to) const {
       static_cast<std::size_t>(result.columns) * static_cast<std::size_t>(result.rows), 0.0);
   const double area = plan_.step.prod();
   for (int j = 0; j < plan_.rows; ++j) {
+    on.go_to(j);
     for (int i = 0; i < plan_.columns; ++i) {
       const double light = static_cast<double>(std::norm(at(i, j))) * area;
       if (light == 0.0) continue;
       on.for_each_pixel(
-          i, j, [&](std::size_t pixel, double share) { result.light[pixel] += share * light; });
+          i, [&](std::size_t pixel, double share) { result.light[pixel] += share * light; });
     }
   }
   return result;
 }
 
 void PlaneField::pull(const OnPicture& to, std::span<const double> by_pixel) {
-  const NodesOnPixels on(plan_, to);
+  NodesOnPixels on(plan_, to);
   std::vector<double> bars;
   for (int row = on.low.y(); row < on.high.y(); ++row) {
     const auto first = by_pixel.begin() + std::ptrdiff_t{row} * to.pixels.x();
@@ -447,11 +529,11 @@ void PlaneField::pull(const OnPicture& to, std::span<const double> by_pixel) {
   }
   const double doubled_area = 2.0 * plan_.step.prod();
   for (int j = 0; j < plan_.rows; ++j) {
+    on.go_to(j);
     for (int i = 0; i < plan_.columns; ++i) {
       double bar = 0.0;
       if (!on.none()) {
-        on.for_each_pixel(i, j,
-                          [&](std::size_t pixel, double share) { bar += share * bars[pixel]; });
+        on.for_each_pixel(i, [&](std::size_t pixel, double share) { bar += share * bars[pixel]; });
       }
       at(i, j) *= static_cast<float>(doubled_area * bar);
     }

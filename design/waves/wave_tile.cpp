@@ -38,6 +38,8 @@ constexpr double kLeastRamp = 1.0;  ///< In √(λ f).
 /// Magnifications that are tried: so many either side of 1, up to the most.
 constexpr int kMagnifications = 12;
 constexpr double kMostWider = 8.0;
+/// Rays by which one is chosen, about.
+constexpr double kMagnifiedRays = 5000.0;
 
 /// Room for rays to change in a plan that is kept, as a factor; one that is used less than by
 /// kLeastUse is made anew: a step that went too far may have left it.
@@ -95,10 +97,13 @@ class WaveTile {
   /// The tile's field on the screen.
   [[nodiscard]] PlaneField on_screen() const {
     PlaneField field(plan_.field);
-    if (field.plan().points.prod() > 1) {
-      for_each_laid([&](const auto& vertices, const auto& /*indices*/) { field.cover(vertices); });
+    if (has_edge()) {
+      for_each_laid([&](const auto& vertices, const auto& indices) {
+        if (from_edge(indices) < 2 * edge_ring()) field.cover(vertices);
+      });
     }
-    for_each_laid([&](const auto& vertices, const auto& /*indices*/) { field.add(vertices); });
+    for_each_laid(
+        [&](const auto& vertices, const auto& indices) { field.add(vertices, where(indices)); });
     field.propagate();
     return field;
   }
@@ -122,7 +127,7 @@ class WaveTile {
     field.return_back();
     std::vector<double> by_path(nodes_.size(), 0.0);
     for_each_laid([&](const auto& vertices, const auto& indices) {
-      field.gather(vertices, indices, by_path);
+      field.gather(vertices, where(indices), indices, by_path);
     });
     field.gather_rest(by_path);
     for (int j = 0; j < rows_; ++j) {
@@ -182,6 +187,7 @@ class WaveTile {
       make_plan();
     }
     weigh_nodes();
+    if (has_edge()) find_edge();
     if (plan_.limited) for_each_ray([&](const Three&, double flux) { as_rays_ += flux; });
     plan_.divided = should_be_divided();
   }
@@ -455,11 +461,16 @@ class WaveTile {
   [[nodiscard]] Eigen::Vector2d best_magnification() const {
     const FieldPlan& field = plan_.field;
     std::vector<Eigen::Vector2d> from, to;
-    for (const Node& node : nodes_) {
-      if (!is_bright(node)) continue;
-      from.emplace_back(node.q - field.centre);
-      const double secant = 1.0 / std::sqrt(1.0 - node.cosine.squaredNorm());
-      to.emplace_back(from.back() + field.distance * secant * node.cosine);
+    const int every =
+        1 + static_cast<int>(std::sqrt(static_cast<double>(nodes_.size()) / kMagnifiedRays));
+    for (int j = 0; j < rows_; j += every) {
+      for (int i = 0; i < columns_; i += every) {
+        const Node& node = nodes_[index({i, j})];
+        if (!is_bright(node)) continue;
+        from.emplace_back(node.q - field.centre);
+        const double secant = 1.0 / std::sqrt(1.0 - node.cosine.squaredNorm());
+        to.emplace_back(from.back() + field.distance * secant * node.cosine);
+      }
     }
     Eigen::Vector2d best(1.0, 1.0);
     for (int axis = 0; axis < 2; ++axis) {
@@ -535,12 +546,66 @@ class WaveTile {
   /// True if it ends at the lens's rim, where no window fades the light.
   static bool is_cut(const Stretch& axis) { return axis.rise == 0 || axis.fall == 0; }
 
+  [[nodiscard]] bool has_edge() const { return plan_.field.points.prod() > 1; }
+
+  /// Numbers of nodes of a triangle.
+  using Indices = std::array<std::size_t, 3>;
+
+  /// Steps of the rays from a triangle to where the lit ones end, up to kFar.
+  [[nodiscard]] int from_edge(const Indices& triangle) const {
+    return std::min({from_edge_[triangle[0]], from_edge_[triangle[1]], from_edge_[triangle[2]]});
+  }
+  static constexpr std::uint8_t kFar = 200;
+
+  /// Steps of the rays that a cell of the field reaches beyond a triangle, with room for rays that
+  /// go closer together.
+  [[nodiscard]] int edge_ring() const {
+    const double reach = plan_.field.step.cwiseQuotient(surface_.spacing).maxCoeff();
+    return 1 + static_cast<int>(std::ceil(std::min(2.0 * reach, 0.5 * kFar - 1.0)));
+  }
+  [[nodiscard]] PlaneField::Where where(const Indices& triangle) const {
+    return has_edge() && from_edge(triangle) < edge_ring() ? PlaneField::Where::kAtEdge
+                                                           : PlaneField::Where::kInside;
+  }
+
+  /// Counts the steps from the edge (Rosenfeld and Pfaltz's chessboard distance, two passes).
+  void find_edge() {
+    from_edge_.assign(nodes_.size(), kFar);
+    const auto is_border = [&](int i, int j) {
+      return i == 0 || j == 0 || i == columns_ - 1 || j == rows_ - 1;
+    };
+    for (int j = 0; j < rows_; ++j) {
+      for (int i = 0; i < columns_; ++i) {
+        if (is_border(i, j)) from_edge_[index({i, j})] = 0;
+      }
+    }
+    for_each_triangle([&](const Three& t) {
+      if (is_bright(t)) return;
+      for (const Corner& c : t) from_edge_[index(c)] = 0;
+    });
+    const auto pass = [&](int to) {
+      for (int m = 1; m + 1 < rows_; ++m) {
+        const int j = to > 0 ? m : rows_ - 1 - m;
+        for (int n = 1; n + 1 < columns_; ++n) {
+          const int i = to > 0 ? n : columns_ - 1 - n;
+          const std::size_t last = index({i, j - to});
+          const int nearest = std::min({from_edge_[index({i - to, j})], from_edge_[last - 1],
+                                        from_edge_[last], from_edge_[last + 1]});
+          std::uint8_t& mine = from_edge_[index({i, j})];
+          mine = static_cast<std::uint8_t>(std::min<int>(mine, nearest + 1));
+        }
+      }
+    };
+    pass(1);
+    pass(-1);
+  }
+
   /// Calls `take(vertices, indices)` for the lit triangles on the starting plane.
   template <class Take>
   void for_each_laid(const Take& take) const {
     for_each_triangle([&](const Three& t) {
       if (!is_bright(t)) return;
-      const std::array<std::size_t, 3> indices{index(t[0]), index(t[1]), index(t[2])};
+      const Indices indices{index(t[0]), index(t[1]), index(t[2])};
       take(std::array<PlaneField::Vertex, 3>{nodes_[indices[0]].laid, nodes_[indices[1]].laid,
                                              nodes_[indices[2]].laid},
            indices);
@@ -578,6 +643,7 @@ class WaveTile {
   int columns_, rows_;
   std::vector<Node> nodes_;
   std::vector<Eigen::Vector3d> corners_;
+  std::vector<std::uint8_t> from_edge_;  ///< By node; of a field with a hard edge.
   Eigen::Vector3d mean_{0.0, 0.0, 1.0};  ///< Direction of all its light.
   double whole_ = 0.0;
   double as_rays_ = 0.0;  ///< Light of directions that are too steep for the field.
