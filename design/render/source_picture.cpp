@@ -26,6 +26,9 @@ namespace {
 constexpr double kPointsPerPixel = 25.0;
 constexpr int kMinPoints = 64;
 constexpr int kMaxPoints = 256;
+/// An image of at most so many pixels takes half of the minimum: of a 48² lake with one of 0.18
+/// pixels 32 points err by an MAE of 0.00009, 64 by 0.00005.
+constexpr double kSmallImage = 0.5;
 
 double surface_height(const Lens& lens) { return lens.surface.vertices.row(2).mean(); }
 
@@ -42,7 +45,8 @@ std::vector<double> point_picture(const Lens& lens, const OpticalSetup& setup,
 int source_point_count(const OpticalSetup& setup, double z) {
   const double blur = source_blur(setup, z);
   const double wanted = kPointsPerPixel * blur * blur;
-  return wanted < kMaxPoints ? std::max(kMinPoints, static_cast<int>(wanted)) : kMaxPoints;
+  const int least = blur > kSmallImage ? kMinPoints : kMinPoints / 2;
+  return wanted < kMaxPoints ? std::max(least, static_cast<int>(wanted)) : kMaxPoints;
 }
 
 std::vector<double> picture_under(const OpticalSetup& setup, int count, const PointPicture& picture,

@@ -38,8 +38,6 @@ constexpr double kLeastRamp = 1.0;  ///< In √(λ f).
 /// Magnifications that are tried: so many either side of 1, up to the most.
 constexpr int kMagnifications = 12;
 constexpr double kMostWider = 8.0;
-/// Rays by which one is chosen, about.
-constexpr double kMagnifiedRays = 5000.0;
 
 /// Room for rays to change in a plan that is kept, as a factor; one that is used less than by
 /// kLeastUse is made anew: a step that went too far may have left it.
@@ -460,31 +458,27 @@ class WaveTile {
   /// The magnification with which the field has the fewest nodes.
   [[nodiscard]] Eigen::Vector2d best_magnification() const {
     const FieldPlan& field = plan_.field;
-    std::vector<Eigen::Vector2d> from, to;
-    const int every =
-        1 + static_cast<int>(std::sqrt(static_cast<double>(nodes_.size()) / kMagnifiedRays));
-    for (int j = 0; j < rows_; j += every) {
-      for (int i = 0; i < columns_; i += every) {
-        const Node& node = nodes_[index({i, j})];
-        if (!is_bright(node)) continue;
-        from.emplace_back(node.q - field.centre);
-        const double secant = 1.0 / std::sqrt(1.0 - node.cosine.squaredNorm());
-        to.emplace_back(from.back() + field.distance * secant * node.cosine);
-      }
+    // Places of the rays along each axis on both planes, from the middle.
+    Eigen::ArrayX2d from(nodes_.size(), 2), to(nodes_.size(), 2);
+    Eigen::Index rays = 0;
+    for (const Node& node : nodes_) {
+      if (!is_bright(node)) continue;
+      const Eigen::Vector2d begin = node.q - field.centre;
+      const double secant = 1.0 / std::sqrt(1.0 - node.cosine.squaredNorm());
+      from.row(rays) = begin;
+      to.row(rays) = begin + field.distance * secant * node.cosine;
+      ++rays;
     }
     Eigen::Vector2d best(1.0, 1.0);
     for (int axis = 0; axis < 2; ++axis) {
+      const auto begin = from.col(axis).head(rays);
+      const auto end = to.col(axis).head(rays);
+      const double start = begin.abs().maxCoeff();
+      const double far = end.abs().maxCoeff();
       double fewest = HUGE_VAL;
       for (int k = -kMagnifications; k <= kMagnifications; ++k) {
         const double wider = std::pow(kMostWider, static_cast<double>(k) / kMagnifications);
-        double steepest = 0.0, start = 0.0, far = 0.0;
-        for (std::size_t n = 0; n < from.size(); ++n) {
-          const double begin = from[n][axis];
-          const double end = to[n][axis];
-          steepest = std::max(steepest, std::abs(end - wider * begin) / field.distance);
-          start = std::max(start, std::abs(begin));
-          far = std::max(far, std::abs(end));
-        }
+        const double steepest = (end - wider * begin).abs().maxCoeff() / field.distance;
         const double count =
             field_size(axis, start, far / wider, wider) / node_step(axis, steepest, wider);
         if (count >= fewest) continue;
