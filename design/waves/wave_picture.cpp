@@ -455,7 +455,7 @@ void NodeWaves::look_adjoint(std::span<const double> by_pixel, double* positions
 
 double wave_seconds(const OpticalSetup& setup, double wavelength) {
   constexpr double kPerInterference =
-      2700.0;  // Per lens area · λ / f, which is about the number of nodes.
+      1100.0;  // Per lens area · λ / f, which is about the number of nodes.
   const std::size_t colors = std::max<std::size_t>(1, setup.spectrum.wavelengths.size());
   const double spot = spot_area(setup, 0.0, wavelength);
   return kPerInterference * static_cast<double>(colors) * setup.lens_size.prod() * wavelength *

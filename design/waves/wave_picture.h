@@ -87,7 +87,7 @@ std::vector<double> wave_flux_of(const WavePart& part, const OpticalSetup& setup
 double ramp_width(const OpticalSetup& setup, double height, const WaveOptions& options);
 
 /// Processor seconds of one surface's picture in one wavelength, about, on 2 GHz cores: 128² on 25
-/// mm at 75 mm take 9 to 13.
+/// mm at 75 mm take 4 to 5.
 /// @param wavelength  mm; of each wavelength of a spectrum about as long.
 double wave_seconds(const OpticalSetup& setup, double wavelength);
 
