@@ -59,8 +59,8 @@ class LineTransform {
   fftwf_plan plan_ = nullptr;
 };
 
-/// Columns that are transformed at once: a line of the cache holds a value of each.
-constexpr int kColumns = 8;
+/// Columns that are transformed at once: two lines of the cache hold a value of each.
+constexpr int kColumns = 16;
 
 /// e^{2πi t} of many t at once; most of the work of laying and propagating fields.
 class UnitPhases {
@@ -333,12 +333,16 @@ void PlaneField::go(bool back) {
       kept.push_back(std::abs(way[axis] * direction) <= plan_.reach[axis] ? scale : 0.0);
     }
     phases.find(turns);
-    std::vector<std::complex<float>> all(turns.size());
-    for (std::size_t n = 0; n < all.size(); ++n) all[n] = static_cast<float>(kept[n]) * phases[n];
+    Eigen::ArrayXcf all(count);
+    for (int n = 0; n < count; ++n) {
+      const auto at = static_cast<std::size_t>(n);
+      all[n] = static_cast<float>(kept[at]) * phases[at];
+    }
     return all;
   };
-  const auto along_x = factors(plan_.columns, 0, 1.0 / static_cast<double>(values_.size()));
-  const auto along_y = factors(plan_.rows, 1, 1.0);
+  const Eigen::ArrayXcf along_x =
+      factors(plan_.columns, 0, 1.0 / static_cast<double>(values_.size()));
+  const Eigen::ArrayXcf along_y = factors(plan_.rows, 1, 1.0);
   transform_rows(FFTW_FORWARD);
   turn_columns(along_x, along_y);
   transform_rows(FFTW_BACKWARD);
@@ -353,35 +357,31 @@ void PlaneField::transform_rows(int sign) {
   }
 }
 
-void PlaneField::turn_columns(const std::vector<std::complex<float>>& along_x,
-                              const std::vector<std::complex<float>>& along_y) {
+void PlaneField::turn_columns(const Eigen::ArrayXcf& along_x, const Eigen::ArrayXcf& along_y) {
   const LineTransform forward(plan_.rows, FFTW_FORWARD);
   const LineTransform backward(plan_.rows, FFTW_BACKWARD);
-  const auto rows = static_cast<std::size_t>(plan_.rows);
-  std::vector<std::complex<float>> held(kColumns * rows);
+  Eigen::ArrayXXcf held(plan_.rows, kColumns);
   for (int first = 0; first < plan_.columns; first += kColumns) {
     const int count = std::min(kColumns, plan_.columns - first);
-    const auto each = [&](const auto& action) {
-      for (int j = 0; j < plan_.rows; ++j) {
-        for (int k = 0; k < count; ++k) {
-          action(held[static_cast<std::size_t>(k) * rows + static_cast<std::size_t>(j)],
-                 at(first + k, j));
-        }
-      }
-    };
-    each([](std::complex<float>& mine, const std::complex<float>& node) { mine = node; });
+    for (int j = 0; j < plan_.rows; ++j) {
+      const std::complex<float>* const row = &at(first, j);
+      for (int k = 0; k < count; ++k) held(j, k) = row[k];
+    }
     for (int k = 0; k < count; ++k) {
-      std::complex<float>* const column = &held[static_cast<std::size_t>(k) * rows];
-      const std::complex<float> of_column = along_x[static_cast<std::size_t>(first + k)];
+      auto column = held.col(k);
+      const std::complex<float> of_column = along_x[first + k];
       if (of_column == 0.0F) {
-        std::fill_n(column, rows, 0.0F);
+        column = 0.0F;
         continue;
       }
-      forward.run(column);
-      for (std::size_t j = 0; j < rows; ++j) column[j] *= along_y[j] * of_column;
-      backward.run(column);
+      forward.run(column.data());
+      column *= along_y * of_column;
+      backward.run(column.data());
     }
-    each([](const std::complex<float>& mine, std::complex<float>& node) { node = mine; });
+    for (int j = 0; j < plan_.rows; ++j) {
+      std::complex<float>* const row = &at(first, j);
+      for (int k = 0; k < count; ++k) row[k] = held(j, k);
+    }
   }
 }
 

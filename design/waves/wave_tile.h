@@ -168,8 +168,7 @@ class PlaneField {
   void go(bool back);
   void transform_rows(int sign);
   /// Transforms the columns, multiplies, and transforms them back.
-  void turn_columns(const std::vector<std::complex<float>>& along_x,
-                    const std::vector<std::complex<float>>& along_y);
+  void turn_columns(const Eigen::ArrayXcf& along_x, const Eigen::ArrayXcf& along_y);
 
   FieldPlan plan_;
   std::vector<std::complex<float>> values_;
