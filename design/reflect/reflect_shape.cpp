@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -17,6 +18,7 @@
 #include "core/io/checkpoint_file.h"
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
+#include "design/reflect/glare.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"
@@ -96,6 +98,11 @@ class Schedule {
       if (options_.radar_ghz > 0.0) {
         result.radar = compare_radar(frame_.from_unit(reference_), frame_.from_unit(mesh_),
                                      options_, executor_);
+      }
+      if (!options_.glare.empty()) {
+        result.glare = std::make_shared<GlareComparison>(
+            compare_glare(frame_.from_unit(reference_), frame_.from_unit(mesh_),
+                          make_glare_setup(options_), executor_));
       }
     } catch (const Interrupted&) {
       result.status = ReflectResult::Status::kInterrupted;
