@@ -226,7 +226,8 @@ SunSite site_of(const std::string& text) {
   require(numbers[0], -90.0, 90.0, "latitude");
   require(numbers[1], -180.0, 180.0, "longitude");
   if (zone) require(numbers[2], -12.0, 14.0, "time zone");
-  return {numbers[0], numbers[1], zone ? numbers[2] : std::round(numbers[1] / 15.0)};
+  const double longitude_zone = std::round(numbers[1] / 15.0) + 0.0;  // No negative zero.
+  return {numbers[0], numbers[1], zone ? numbers[2] : longitude_zone};
 }
 
 bool is_mesh_file(const std::string& file) {
@@ -297,13 +298,15 @@ GlareSetup make_glare_setup(const ReflectOptions& options) {
 }
 
 void require_glare_places(const SurfaceMesh& mesh, const GlareSetup& setup) {
-  const RayScene scene(mesh);
-  const Faces faces = measure_faces(mesh);
-  const double farthest = kMaxPlaceDistance * bounding_diagonal(mesh);
-  for (const Vector3d place : setup.places.colwise()) {
-    const std::string words = "--place " + number_text(place.x()) + "," + number_text(place.y()) +
-                              "," + number_text(place.z());
-    if (!((place - faces.centroid.col(0)).cwiseAbs().maxCoeff() <= farthest)) {
+  const UnitFrame frame(mesh);
+  const SurfaceMesh unit = frame.to_unit(mesh);
+  const RayScene scene(unit);
+  const Faces faces = measure_faces(unit);
+  for (const Vector3d given : setup.places.colwise()) {
+    const std::string words = "--place " + number_text(given.x()) + "," + number_text(given.y()) +
+                              "," + number_text(given.z());
+    const Vector3d place = frame.to_unit(given);
+    if (!(place.cwiseAbs().maxCoeff() <= kMaxPlaceDistance * kUnitDiagonal)) {
       throw InputError(words + ": is too far away: must be within 1e6 times the mesh's diagonal");
     }
     bool seen = false;
@@ -368,13 +371,16 @@ Eigen::ArrayXXd GlareYear::monthly() const {
 }
 
 GlareYear yearly_glare(const SurfaceMesh& mesh, const GlareSetup& setup, const Executor& executor) {
-  const RayScene scene(mesh);
+  // Rays have single precision, and a façade may have the coordinates of a map.
+  const UnitFrame frame(mesh);
+  const SurfaceMesh unit = frame.to_unit(mesh);
+  const RayScene scene(unit);
   GlareYear year;
   year.place_maximum.resize(setup.places.cols());
   Eigen::ArrayXd largest = Eigen::ArrayXd::Zero(kSunSteps);
   Eigen::ArrayXd irradiance(kSunSteps);
   for (Eigen::Index p = 0; p < setup.places.cols(); ++p) {
-    const MirrorView view(mesh, scene, setup.places.col(p));
+    const MirrorView view(unit, scene, frame.to_unit(setup.places.col(p)));
     const auto shine = [&](std::int64_t i) {
       const SunStep sun = sun_step(setup, i);
       irradiance[i] =
@@ -424,7 +430,7 @@ std::string maximum_words(const GlareYear& year) {
 constexpr double kCell = 18.0;
 constexpr double kLeft = 40.0;
 constexpr double kTop = 44.0;
-constexpr double kMapWidth = kLeft + 24.0 * kCell + 12.0;
+constexpr double kMapWidth = kLeft + 24.0 * kCell + 24.0;
 constexpr double kMapHeight = kTop + 12.0 * kCell + 28.0;
 
 std::string fill_of(double share) {

@@ -331,6 +331,20 @@ TEST(Glare, ThePlaceWithTheMostIsNamed) {
   EXPECT_EQ(both.place_maximum[1], one.maximum);
 }
 
+/// In metres and the coordinates of a map.
+TEST(Glare, DoesNotDependOnUnitAndOrigin) {
+  GlareSetup setup = setup_at(51.51, -0.08, 0.0);
+  setup.places = Vector3d(0.0, -0.6, 0.1);
+  SurfaceMesh mesh = shapes::concave_facade(0.3, 8);
+  const GlareYear near = yearly_glare(mesh, setup, Executor::cpu(2));
+  const Vector3d origin(533000.0, 180700.0, 15.0);
+  mesh.vertices = (20.0 * mesh.vertices).colwise() + origin;
+  setup.places = 20.0 * setup.places + origin;
+  EXPECT_NO_THROW(require_glare_places(mesh, setup));
+  const GlareYear far = yearly_glare(mesh, setup, Executor::cpu(2));
+  EXPECT_LT((far.hourly - near.hourly).abs().maxCoeff(), 1e-3 * near.maximum);
+}
+
 TEST(Glare, WestIsWhereTheClockIsLate) {
   const auto zone = [](const std::string& glare) {
     ReflectOptions options = facade_options();
@@ -339,6 +353,7 @@ TEST(Glare, WestIsWhereTheClockIsLate) {
   };
   EXPECT_EQ(zone("36.11,-115.18"), -8.0);
   EXPECT_EQ(zone("36.11,-115.18,-7"), -7.0);
+  EXPECT_FALSE(std::signbit(zone("51.51,-0.08")));
 }
 
 TEST(Glare, BadInputIsNamed) {
