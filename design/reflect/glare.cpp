@@ -259,8 +259,7 @@ Eigen::Matrix3Xd glare_places(const std::string& text) {
   std::error_code ignored;
   const bool file = std::filesystem::exists(text, ignored);
   if (!file && text.find(',') != std::string::npos) return number_list("--place", text, 3);
-  const Eigen::Matrix3Xd places =
-      is_mesh_file(text) ? read_mesh(text).vertices : listed_places(text);
+  Eigen::Matrix3Xd places = is_mesh_file(text) ? read_mesh(text).vertices : listed_places(text);
   if (places.cols() >= 1 && places.cols() <= kMaxPlaces) return places;
   throw InputError("--place " + text + ": has " + std::to_string(places.cols()) +
                    " places: must have 1 to " + std::to_string(kMaxPlaces) +

@@ -301,6 +301,15 @@ TEST(Glare, OfAConcaveFacadeFallsToATenthByDeflecting) {
   ASSERT_TRUE(result.glare);
   EXPECT_GT(result.glare->before.maximum, 300.0);
   EXPECT_LT(result.glare->after.maximum, 0.1 * result.glare->before.maximum);
+  // Not because it turned its back.
+  const Faces faces = measure_faces(result.mesh);
+  const Vector3d place(0.0, -0.9, 0.1);
+  Eigen::Index fronts = 0;
+  for (Eigen::Index k = 0; k < faces.count(); ++k) {
+    fronts += faces.normal.col(k).dot(place - faces.centroid.col(k)) > 0.0;
+  }
+  EXPECT_GT(fronts, 0.95 * static_cast<double>(faces.count()));
+  EXPECT_LT(result.mean_displacement, 0.05);
 }
 
 TEST(Glare, TakesPlacesFromTextsFilesAndMeshes) {
