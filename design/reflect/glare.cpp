@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -52,17 +53,23 @@ constexpr std::complex<double> kAluminium{0.96, 6.69};
 
 MirrorMaterial mirror_material(const std::string& name) {
   if (name == kMetal) return {name, kAluminium, false};
-  std::vector<std::string> names = material_names();
+  const std::vector<std::string> names = mirror_material_names();
   std::error_code ignored;
   if (std::find(names.begin(), names.end(), name) == names.end() &&
       !std::filesystem::exists(name, ignored)) {
-    throw InputError("--glare-material '" + printable_line(name) + "': must be " + kMetal + ", " +
+    throw InputError("--glare-material '" + printable_line(name) + "': must be " +
                      joined(names, ", ") + ", or a file of wavelengths in µm and indices");
   }
   return {name, material_named(name, "--glare-material").index(kLineD), true};
 }
 
 }  // namespace
+
+std::vector<std::string> mirror_material_names() {
+  std::vector<std::string> names = material_names();
+  names.insert(names.begin(), kMetal);
+  return names;
+}
 
 double MirrorMaterial::reflectance(double cosine) const {
   const double c = std::clamp(cosine, 0.0, 1.0);
@@ -209,7 +216,6 @@ double MirrorView::gain(const Vector3d& sun, double radius, const MirrorMaterial
 
 namespace {
 
-constexpr std::uintmax_t kMaxPlaceBytes = std::uintmax_t{16} << 20U;
 /// Maximum number of places: at 800 faces each takes a second of one core.
 constexpr Eigen::Index kMaxPlaces = 1000;
 /// Maximum distance of a place, in diagonals: Embree's rays have single precision.

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <complex>
+#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -30,6 +31,9 @@ struct MirrorMaterial {
   /// @param cosine  of the angle of incidence, 0 … 1.
   [[nodiscard]] double reflectance(double cosine) const;
 };
+
+/// "aluminium" and those of material_names(), the words of --glare-material.
+std::vector<std::string> mirror_material_names();
 
 /// Angular radius of the sun at the distance 1, rad (959.63″, Auwers 1891).
 inline constexpr double kSunRadius = 959.63 / 3600.0 * kDegree;
@@ -79,6 +83,9 @@ class MirrorView {
   Eigen::VectorXd cosine_;
   Eigen::VectorXd sine_;
 };
+
+/// Maximum size of a file of places.
+inline constexpr std::uintmax_t kMaxPlaceBytes = std::uintmax_t{16} << 20U;
 
 /// All that glare depends on beside the shape.
 struct GlareSetup {

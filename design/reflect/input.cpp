@@ -64,9 +64,8 @@ void describe_glare(Description& d, ReflectOptions& o) {
            "count the hours a year above this irradiance; 0 counts none");
   d.number("--glare-north", o.glare_north_deg, Limits::between(-360, 360), "degrees",
            "direction of +y, clockwise from north");
-  d.text("--glare-material", o.glare_material, "NAME|FILE",
-         "of the faces: aluminium, or panes of pmma, pc, glass-bk7, resin or a file of "
-         "wavelengths in um and indices");
+  d.text("--glare-material", o.glare_material, joined(mirror_material_names(), "|") + "|FILE",
+         "of the faces: metal, or panes with two faces; a file has wavelengths in um and indices");
   d.number("--glare-turbidity", o.turbidity, Limits::between(1, 10), "",
            "Linke's turbidity of the clear sky: 2 clear and dry, 3 usual, 5 hazy");
 }

@@ -5,17 +5,20 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/io/checkpoint_file.h"
+#include "core/io/files.h"
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "design/reflect/glare.h"
@@ -448,6 +451,10 @@ std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOption
   hash.add(description.dump());
   hash.add(bytes_of(entries(input.mesh.vertices)));
   hash.add(bytes_of(entries(input.mesh.triangles)));
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(options.place, ignored)) {
+    hash.add(read_whole_file(options.place, kMaxPlaceBytes));
+  }
   return hash.value();
 }
 

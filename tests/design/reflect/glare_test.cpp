@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
@@ -322,6 +323,10 @@ TEST(Glare, TakesPlacesFromTextsFilesAndMeshes) {
   ASSERT_EQ(places.cols(), 2);
   EXPECT_EQ(places.col(1), Vector3d(2.0, -3.0, 1.0));
   EXPECT_EQ(make_light_field(options).goal.from, Vector3d(1.0, -2.0, 0.5));
+  const ReflectInput input{plate(1.0, 1.0), false, {}, {}, {}, {}};
+  const std::uint64_t before = reflect_fingerprint(input, options);
+  write_whole_file(folder / "places.txt", "0,-1,0\n2,-3,2\n");
+  EXPECT_NE(reflect_fingerprint(input, options), before);
   write_ply(plate(1.0, 1.0), folder / "ground.ply");
   options.place = (folder / "ground.ply").string();
   EXPECT_EQ(make_glare_setup(options).places.cols(), 4);
