@@ -14,6 +14,7 @@
 #include "core/mesh/mesh_files.h"
 #include "core/text/number_text.h"
 #include "design/reflect.h"
+#include "design/reflect/glare.h"
 #include "design/reflect/radar.h"
 #include "export/solid/solid_reading.h"
 
@@ -70,7 +71,24 @@ nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settin
                      {"mean_dbsm", reflect::mean_dbsm(
                                        reflect::radar_sections(mesh, settings.reflect, executor))}};
   }
+  if (!settings.reflect.glare.empty()) {
+    const reflect::GlareSetup setup = reflect::make_glare_setup(settings.reflect);
+    json["glare"] = reflect::glare_json(setup);
+    json["glare"].update(reflect::glare_json(setup, reflect::yearly_glare(mesh, setup, executor)));
+  }
   return json;
+}
+
+/// "1240 W/m2 (2025-03-08 12:35), 31.5 h a year above 500 W/m2"
+/// @param year  reflect::glare_json() of a year. @param setup  the setup's, with the limit.
+std::string glare_words(const nlohmann::json& year, const nlohmann::json& setup) {
+  std::string text = number_text(year["maximum"], 4) + " W/m2";
+  if (year["time"].is_string()) text += " (" + year["time"].get<std::string>() + ")";
+  if (setup.contains("limit")) {
+    text += ", " + fixed(year["hours_above_limit"], 1) + " h a year above " +
+            number_text(setup["limit"], 4) + " W/m2";
+  }
+  return text;
 }
 
 CommandResult evaluate(CommandFrame& frame, const ReflectSettings& settings) {
@@ -85,6 +103,9 @@ CommandResult evaluate(CommandFrame& frame, const ReflectSettings& settings) {
     text += "  radar cross-section around the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
             " dBsm on average\n";
   }
+  if (json.contains("glare")) {
+    text += "  reflected sunlight at most " + glare_words(json["glare"], json["glare"]) + "\n";
+  }
   return {json, text};
 }
 
@@ -95,6 +116,13 @@ std::string radar_text(const reflect::ReflectResult& result) {
   return "  radar cross-section around the horizon " +
          fixed(reflect::mean_dbsm(result.radar->before), 1) + " -> " +
          fixed(reflect::mean_dbsm(result.radar->after), 1) + " dBsm on average\n";
+}
+
+std::string glare_text(const reflect::ReflectResult& result) {
+  if (!result.glare) return "";
+  const nlohmann::json glare = reflect::glare_json(*result.glare);
+  return "  reflected sunlight at most " + glare_words(glare["before"], glare) + " before,\n    " +
+         glare_words(glare["after"], glare) + " after\n";
 }
 
 std::string result_text(const ReflectSettings& settings, const reflect::ReflectResult& result) {
@@ -109,7 +137,7 @@ std::string result_text(const ReflectSettings& settings, const reflect::ReflectR
          number_text(result.before.direct, 4) + " -> " + number_text(result.after.direct, 4) +
          "\n  vertices moved by " + percent(result.mean_displacement, 2) +
          " of the diagonal on average, by " + percent(result.max_displacement, 2) + " at most\n" +
-         radar_text(result);
+         radar_text(result) + glare_text(result);
 }
 
 bool is_of_result(const std::string& name) {

@@ -18,6 +18,7 @@
 #include "core/schema/description.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
+#include "design/reflect/glare.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/mesh/faces.h"
 #include "design/reflect/radar.h"
@@ -52,6 +53,23 @@ void describe_bounds(Description& d, ReflectOptions& o) {
            "keep this much material behind every vertex that has it; 0 sets no limit");
 }
 
+/// Sunlight that a façade reflects.
+void describe_glare(Description& d, ReflectOptions& o) {
+  d.text(
+      "--glare", o.glare, "LAT,LON[,ZONE]",
+      "compute the sunlight that reaches --place by one reflection through a year, W/m2: degrees "
+      "north and east, hours that clocks are ahead of UTC (LON/15 without them); x is east and "
+      "y north. The light of point and deflect then follows the sun's path there");
+  d.number("--glare-limit", o.glare_limit, Limits::zero_or(1e-3, 1e9), "W/m2",
+           "count the hours a year above this irradiance; 0 counts none");
+  d.number("--glare-north", o.glare_north_deg, Limits::between(-360, 360), "degrees",
+           "direction of +y, clockwise from north");
+  d.text("--glare-material", o.glare_material, joined(mirror_material_names(), "|") + "|FILE",
+         "of the faces: metal, or panes with two faces; a file has wavelengths in um and indices");
+  d.number("--glare-turbidity", o.turbidity, Limits::between(1, 10), "",
+           "Linke's turbidity of the clear sky: 2 clear and dry, 3 usual, 5 hazy");
+}
+
 }  // namespace
 
 void describe(Description& d, ReflectOptions& o) {
@@ -62,8 +80,10 @@ void describe(Description& d, ReflectOptions& o) {
           {"deflect", GoalKind::kDeflect}},
          "send little light back to where it comes from, much of it to a point or "
          "to a line, or little of it to a point");
-  d.text("--place", o.place, "X,Y,Z[,X,Y,Z]",
-         "the point of --goal point and deflect, or the two ends of the line");
+  d.text("--place", o.place, "X,Y,Z[,X,Y,Z]|FILE",
+         "the point of --goal point and deflect and of --glare, or the two ends of the line; with "
+         "--glare also a file with a line X,Y,Z for every point, or a mesh whose vertices are "
+         "points: the goal's point is then their mean");
   d.text("--light", o.light, "X,Y,Z[;X,Y,Z...]",
          "directions towards the light, instead of the band (stealth) or the sun's half "
          "circle from east (+x) over noon (0,-1,1) to west");
@@ -102,12 +122,14 @@ void describe(Description& d, ReflectOptions& o) {
   d.word("--polarization", o.polarization,
          {{"vv", Polarization::kVertical}, {"hh", Polarization::kHorizontal}},
          "of --radar: the electric field sent and received is vertical or horizontal");
+  describe_glare(d, o);
   d.flag("--force", o.force, "replace files that lensforge did not write").left_out =
       "it does not change the shape";
 }
 
 void validate(const ReflectOptions& options) {
   require_limits(options);
+  require_glare_options(options);
   make_light_field(options);
 }
 
@@ -570,6 +592,7 @@ ReflectInput prepared_input(const SurfaceMesh& mesh, const std::string& name,
   if (options.radar_ghz > 0.0) {
     require_radar_size(input.mesh, radar_wavelength(options.radar_ghz));
   }
+  if (!options.glare.empty()) require_glare_places(input.mesh, make_glare_setup(options));
   find_fixed(options, repaired, input);
   if (!options.planar_faces.empty()) {
     input.planar = planar_groups(options, mesh.triangle_count(), repaired);

@@ -46,7 +46,9 @@ enum class Polarization {
 /// Options of a run. Lengths and places are in the units of the mesh, z is up.
 struct ReflectOptions {
   GoalKind goal = GoalKind::kStealth;
-  std::string place;  ///< Goal's "X,Y,Z" of a point or "X,Y,Z,X,Y,Z" of a line's ends.
+  /// Goal's "X,Y,Z" of a point or "X,Y,Z,X,Y,Z" of a line's ends; with `glare` a file of points,
+  /// too.
+  std::string place;
   std::string light;  ///< "X,Y,Z;X,Y,Z;…" towards the light; empty: the band or the sun.
   Method method = Method::kExact;
   int seed = 1;                 ///< For the paper's random paths.
@@ -72,7 +74,12 @@ struct ReflectOptions {
   double min_thickness = 0.0;     ///< Minimum of the material behind a vertex; 0: none.
   double radar_ghz = 0.0;         ///< Frequency of radar cross-sections; 0: none.
   Polarization polarization = Polarization::kVertical;  ///< Of the radar.
-  bool force = false;  ///< Replace files that lensforge did not write.
+  std::string glare;         ///< "LAT,LON[,ZONE]": reflected sunlight at the place; empty: none.
+  double glare_limit = 0.0;  ///< W/m² whose hours are counted; 0: none.
+  double glare_north_deg = 0.0;  ///< Bearing of +y, clockwise from north.
+  std::string glare_material = "glass-bk7";
+  double turbidity = 3.0;  ///< Linke's.
+  bool force = false;      ///< Replace files that lensforge did not write.
   /// File that takes a checkpoint every second; none is written if empty.
   std::filesystem::path checkpoint;
   /// Continue from `checkpoint`. The same mesh and options give the same shape as without

@@ -5,18 +5,23 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/io/checkpoint_file.h"
+#include "core/io/files.h"
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
+#include "design/reflect/glare.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"
@@ -96,6 +101,11 @@ class Schedule {
       if (options_.radar_ghz > 0.0) {
         result.radar = compare_radar(frame_.from_unit(reference_), frame_.from_unit(mesh_),
                                      options_, executor_);
+      }
+      if (!options_.glare.empty()) {
+        result.glare = std::make_shared<GlareComparison>(
+            compare_glare(frame_.from_unit(reference_), frame_.from_unit(mesh_),
+                          make_glare_setup(options_), executor_));
       }
     } catch (const Interrupted&) {
       result.status = ReflectResult::Status::kInterrupted;
@@ -441,6 +451,10 @@ std::uint64_t reflect_fingerprint(const ReflectInput& input, const ReflectOption
   hash.add(description.dump());
   hash.add(bytes_of(entries(input.mesh.vertices)));
   hash.add(bytes_of(entries(input.mesh.triangles)));
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(options.place, ignored)) {
+    hash.add(read_whole_file(options.place, kMaxPlaceBytes));
+  }
   return hash.value();
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,8 @@ struct RadarComparison {
   std::vector<double> after;
 };
 
+struct GlareComparison;
+
 struct ReflectResult {
   enum class Status { kDone, kInterrupted };
   Status status = Status::kDone;
@@ -48,6 +51,7 @@ struct ReflectResult {
   double max_displacement = 0.0;
   double seconds = 0.0;
   std::optional<RadarComparison> radar;
+  std::shared_ptr<const GlareComparison> glare;  ///< With --glare only.
   std::vector<std::string> unmet;  ///< Constraints and gains that the shape misses, in words.
 
   [[nodiscard]] bool done() const { return status == Status::kDone; }

@@ -24,6 +24,7 @@
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
+#include "design/reflect/glare.h"
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"
@@ -328,7 +329,8 @@ std::string reflect_report(const ReflectResult& result, const ReflectOptions& op
   const GoalWords words = words_of(options);
   const std::string body =
       joined({warnings(result), summary(result, words), picture_sections(result, words, pictures),
-              energy_section(result), radar_section(result), option_section(options)});
+              energy_section(result), radar_section(result),
+              result.glare ? glare_section(*result.glare) : "", option_section(options)});
   return html_page({"Reflection: " + words.title, header(result, options, words), body,
                     "surface.ply is the new shape, reference.ply the mesh as it came with the same "
                     "vertices and faces; reflect.json and convergence.csv have all figures.",
@@ -401,6 +403,7 @@ nlohmann::json result_json(const ReflectResult& result, const ReflectOptions& op
                          {"warnings", result.unmet},
                          {"options", options_json(options)}};
   if (result.radar) json["radar"] = radar_json(*result.radar);
+  if (result.glare) json["glare"] = glare_json(*result.glare);
   return json;
 }
 
@@ -424,6 +427,10 @@ std::vector<fs::path> write_result(const ReflectResult& result, const ReflectOpt
   if (result.radar) {
     files.add(reflect_file::kRadarTable, radar_csv(*result.radar));
     files.add(reflect_file::kRadarPlot, radar_svg(*result.radar));
+  }
+  if (result.glare) {
+    files.add(reflect_file::kGlareTable, glare_csv(*result.glare));
+    files.add(reflect_file::kGlareMap, glare_svg(*result.glare));
   }
   files.add(reflect_file::kConvergence, convergence_text(result));
   files.add(reflect_file::kJson, result_json(result, options).dump(2) + "\n");

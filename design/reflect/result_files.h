@@ -24,10 +24,13 @@ inline constexpr const char* kConvergence = "convergence.csv";
 inline constexpr const char* kReport = "report.html";
 inline constexpr const char* kRadarTable = "radar.csv";
 inline constexpr const char* kRadarPlot = "radar.svg";
+inline constexpr const char* kGlareTable = "glare.csv";
+inline constexpr const char* kGlareMap = "glare.svg";
 /// Checkpoint of an unfinished run; write_result() does not touch it.
 inline constexpr const char* kCheckpoint = "reflect.checkpoint";
-inline constexpr std::array kAll{kRadarTable, kRadarPlot,    kSurface,     kPrint,  kReference,
-                                 kViews,      kDisplacement, kConvergence, kReport, kJson};
+inline constexpr std::array kAll{kRadarTable,   kRadarPlot,   kGlareTable, kGlareMap,
+                                 kSurface,      kPrint,       kReference,  kViews,
+                                 kDisplacement, kConvergence, kReport,     kJson};
 }  // namespace reflect_file
 
 /// @throw InputError if `folder` has a file of these names that lensforge did not write, unless

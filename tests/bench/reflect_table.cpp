@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The reflector stage on the drawn shapes, as Markdown tables: descents at several numbers of
-// faces, both methods at equal displacement, the figures of Tojo et al., and what silhouettes add
-// to gradients by normals.
+// faces, both methods at equal displacement, the figures of Tojo et al., what silhouettes add to
+// gradients by normals, and the sunlight that façades reflect.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bench/almond_table.h"
+#include "bench/glare_table.h"
 #include "bench/markdown_table.h"
 #include "bench/reflect_figures.h"
 #include "core/text/number_text.h"
@@ -174,6 +175,7 @@ void print(const Settings& settings, const std::vector<std::string>& parts) {
     if (part == "almond" && !settings.almond.empty()) {
       std::puts(almond_table(settings.almond, executor).text().c_str());
     }
+    if (part == "glare") std::puts(glare_table(executor).text().c_str());
     if (part == "slopes") std::puts(slope_table(executor).text().c_str());
     std::fflush(stdout);
   }
@@ -185,11 +187,11 @@ void print(const Settings& settings, const std::vector<std::string>& parts) {
 int main(int argc, char** argv) try {
   using namespace lensforge::bench;
   Settings settings;
-  std::vector<std::string> parts{"descent", "methods", "figures", "slopes", "almond"};
+  std::vector<std::string> parts{"descent", "methods", "figures", "slopes", "almond", "glare"};
   CLI::App app("Tables of the reflector stage on the drawn shapes.");
   app.add_option("--parts", parts,
                  "descent: every shape at several numbers of faces; methods: both at equal "
-                 "displacement; figures; slopes; almond; all without it")
+                 "displacement; figures; slopes; almond; glare; all without it")
       ->delimiter(',')
       ->check(CLI::IsMember(parts));
   app.add_option("--shapes", settings.shapes, "of descent and methods, their names; all without it")

@@ -121,6 +121,84 @@ TEST_F(Reflect, RadarHasTwoPolarizations) {
   expect_refused(kOctahedron, {"--polarization", "vh"}, {"--polarization", "vh"});
 }
 
+/// A wall of four panes that looks south (−y), 2 wide and 2 high.
+constexpr const char* kWall =
+    "OFF\n9 4 0\n-1 0.2 0\n0 0.3 0\n1 0.2 0\n-1 0.2 1\n0 0.3 1\n1 0.2 1\n-1 0.2 2\n0 0.3 2\n1 0.2 "
+    "2\n"
+    "4 0 1 4 3\n4 1 2 5 4\n4 3 4 7 6\n4 4 5 8 7\n";
+
+class Glare : public Reflect {
+ protected:
+  void SetUp() override { write(at("wall.off"), kWall); }
+
+  [[nodiscard]] Arguments wall(const Arguments& more) const {
+    Arguments arguments = {"reflect", path("wall.off"), "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  void expect_bad(const Arguments& more, const std::vector<std::string>& parts) const {
+    Arguments arguments = {"reflect", path("wall.off"), "--out", path("bad")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refusal(run(arguments), 2, parts);
+    EXPECT_THAT(listing(at("bad")), ::testing::Not(::testing::Contains("reflect.json")));
+  }
+};
+
+TEST_F(Glare, IsEvaluatedAtAPlace) {
+  const Outcome outcome =
+      run(wall({"--evaluate", "--glare", "36.11,-115.17,-8", "--place", "0,-1,0.1", "--glare-limit",
+                "50", "--glare-material", "aluminium"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json glare = outcome.json()["glare"];
+  EXPECT_EQ(glare["zone"], -8.0);
+  // Two panes at most mirror the sun to a place at once.
+  EXPECT_GT(glare["maximum"], 700.0);
+  EXPECT_LT(glare["maximum"], 2.1 * 1000.0);
+  EXPECT_GT(glare["hours_above_limit"], 10.0);
+  EXPECT_THAT(glare["time"].get<std::string>(), HasSubstr("2025-"));
+  ASSERT_EQ(glare["monthly"].size(), 12);
+  EXPECT_EQ(glare["monthly"][0].size(), 24);
+}
+
+TEST_F(Glare, IsWrittenBeforeAndAfter) {
+  write(at("places.txt"), "0,-1,0.1\n0.3,-1,0.1\n");
+  const Outcome outcome =
+      run(wall({"--out", path("out"), "--goal", "deflect", "--glare", "51.51,-0.08", "--place",
+                path("places.txt"), "--glare-limit", "20", "--no-split", "--rim-updates", "5"}));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json glare = outcome.json()["glare"];
+  EXPECT_GT(glare["before"]["maximum"], 30.0);
+  EXPECT_LT(glare["after"]["maximum"], glare["before"]["maximum"]);
+  EXPECT_EQ(glare["before"]["places"].size(), 2);
+  EXPECT_EQ(nlohmann::json::parse(content(at("out/reflect.json")))["glare"], glare);
+  EXPECT_THAT(content(at("out/glare.csv")), HasSubstr("month,day,hour,before,after\n1,1,0,0,0\n"));
+  EXPECT_THAT(content(at("out/glare.svg")), HasSubstr("before: at most"));
+  const std::string report = content(at("out/report.html"));
+  EXPECT_THAT(report, HasSubstr("Reflected sunlight"));
+  EXPECT_THAT(report, HasSubstr("hours a year above 20"));
+}
+
+TEST_F(Glare, BadPlacesAndSitesAreRefused) {
+  const Arguments deflect = {"--goal", "deflect", "--glare", "51.51,-0.08"};
+  const auto with = [&](const Arguments& more) {
+    Arguments all = deflect;
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  expect_bad({"--glare", "91,0", "--place", "0,-1,0"}, {"--glare 91,0", "latitude"});
+  expect_bad(with({}), {"--glare", "--place"});
+  expect_bad(with({"--place", "0,1,0"}), {"--place 0,1,0", "behind"});
+  expect_bad(with({"--place", "0,nan,0"}), {"--place 0,nan,0"});
+  write(at("empty.txt"), "");
+  expect_bad(with({"--place", path("empty.txt")}), {"empty.txt", "0 places"});
+  expect_bad(with({"--place", path("none.txt")}), {"none.txt"});
+  expect_bad({"--place", "0,-1,0"}, {"--place 0,-1,0", "--glare"});
+  expect_bad({"--glare-limit", "500"}, {"--glare-limit", "--glare"});
+  write(at("wall.off"), kCube);
+  expect_bad(with({"--place", "4,4,4"}), {"--place 4,4,4", "inside"});
+}
+
 TEST_F(Reflect, FilesOfOthersAreKeptUnlessForced) {
   fs::create_directory(at("out"));
   write(at("out/surface.ply"), "mine");

@@ -13,7 +13,9 @@
 #include "core/error.h"
 #include "core/text/read_numbers.h"
 #include "core/text/words.h"
+#include "design/reflect/glare.h"
 #include "design/reflect/input.h"
+#include "design/reflect/light/sun.h"
 #include "design/reflect/mesh/faces.h"
 
 namespace lensforge::reflect {
@@ -112,7 +114,7 @@ Goal make_goal(const ReflectOptions& options) {
   if (!goal.has_place()) {
     if (options.place.empty()) return goal;
     throw InputError("--place " + options.place +
-                     ": is for --goal point, line and deflect; leave it out");
+                     ": is for --goal point, line and deflect, and for --glare; leave it out");
   }
   const bool line = goal.kind == GoalKind::kLine;
   const Eigen::VectorXd numbers = number_list("--place", options.place, line ? 6 : 3);
@@ -159,7 +161,13 @@ DirectionSet LightField::evaluation_directions() const {
 
 LightField make_light_field(const ReflectOptions& options) {
   LightField field;
-  field.goal = make_goal(options);
+  if (options.glare.empty()) {
+    field.goal = make_goal(options);
+  } else {
+    const GlareSetup glare = make_glare_setup(options);
+    field.goal = {options.goal, glare.places.rowwise().mean(), Eigen::Vector3d::Zero()};
+    if (field.goal.has_place()) field.listed = yearly_sun_vectors(glare.site, glare.bearing);
+  }
   if (!options.light.empty()) field.listed = listed_lights(options.light);
   field.elevation = options.elevation_deg * kDegree;
   field.rows = options.direction_rows;
