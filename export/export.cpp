@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/export.h"
 
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <utility>
 #include <variant>
 
@@ -166,22 +163,12 @@ struct Job {
   [[nodiscard]] fs::path folder() const { return fs::absolute(out).parent_path(); }
 };
 
-/// When the surface was made: the same lens then gives the same bytes at any time.
-std::string time_of(const fs::path& file) {
-  struct stat about {};
-  if (::stat(file.c_str(), &about) != 0) return {};
-  std::tm utc{};
-  ::gmtime_r(&about.st_mtime, &utc);
-  std::array<char, 32> text{};
-  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc)};
-}
-
 StepHeader header_of(const Job& job) {
   return {.name = "lensforge lens",
           .description = "optical surface sha256:" + sha256_of(job.source.file),
           .author = job.options.author,
           .program = program_mark(),
-          .time_stamp = time_of(job.source.file)};
+          .time_stamp = file_time(job.source.file)};
 }
 
 /// Points at which the splines are sampled for their picture, at least; with six a cell of the mesh

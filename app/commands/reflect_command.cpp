@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "app/commands/settings.h"
 #include "app/frame/command_line.h"
@@ -13,9 +15,11 @@
 #include "core/error.h"
 #include "core/mesh/mesh_files.h"
 #include "core/text/number_text.h"
+#include "core/text/version.h"
 #include "design/reflect.h"
 #include "design/reflect/glare.h"
 #include "design/reflect/radar.h"
+#include "export/solid/solid_files.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
@@ -28,6 +32,8 @@ void describe(Description& d, ReflectSettings& settings) {
          "print the reflected energies of the mesh as it is and write nothing");
   d.flag("--resume", settings.resume,
          "continue the interrupted run in --out, with the same mesh and options");
+  d.flag("--step", settings.step,
+         "write surface.step, too: every face flat, closed pieces as solids, open ones as shells");
   describe(d, settings.reflect);
 }
 
@@ -183,10 +189,33 @@ bool settle_checkpoint(ReflectSettings& settings, const reflect::ReflectInput& i
   return true;
 }
 
+/// Writes a shape as STEP. @return the file.
+fs::path write_shape_step(CommandFrame& frame, const ReflectSettings& settings,
+                          const SurfaceMesh& mesh, const fs::path& folder) {
+  const StepHeader header{.name = "lensforge reflector",
+                          .description = "reflecting shape",
+                          .author = {},
+                          .program = program_mark(),
+                          .time_stamp = file_time(settings.mesh)};
+  write_mesh_step(mesh, header, folder / reflect::reflect_file::kSolid, frame.control());
+  return folder / reflect::reflect_file::kSolid;
+}
+
+/// STEP of more faces takes minutes and gigabytes.
+constexpr std::int64_t kMostStepFaces = 100'000;
+
+void require_step_size(const ReflectSettings& settings, const SurfaceMesh& mesh) {
+  if (!settings.step || mesh.triangle_count() <= kMostStepFaces) return;
+  throw InputError("--step: the shape has " + std::to_string(mesh.triangle_count()) +
+                   " faces: must be at most " + std::to_string(kMostStepFaces) +
+                   "; --faces makes fewer, surface.stl has all");
+}
+
 CommandResult shape(CommandFrame& frame, ReflectSettings& settings) {
   require_no_unfinished_run(settings);
   require_readable_checkpoint(settings);
   const reflect::ReflectInput input = load(frame, settings);
+  require_step_size(settings, input.mesh);
   const OutputFolder& folder = frame.begin_folder(settings.out);
   reflect::require_replaceable_result(folder.path(), settings.reflect.force);
   folder.remove_partial_files(is_of_result);
@@ -198,8 +227,12 @@ CommandResult shape(CommandFrame& frame, ReflectSettings& settings) {
       reflect::reflect_shape(input, settings.reflect, frame.executor(),
                              frame.control([&frame] { frame.console().begin(); }));
   nlohmann::json json = reflect::result_json(result, settings.reflect);
-  json["files"] =
-      files_json(reflect::write_result(result, settings.reflect, folder.path(), frame.executor()));
+  std::vector<fs::path> files =
+      reflect::write_result(result, settings.reflect, folder.path(), frame.executor());
+  if (settings.step && result.done()) {
+    files.push_back(write_shape_step(frame, settings, result.mesh, folder.path()));
+  }
+  json["files"] = files_json(files);
   std::error_code ignored;
   if (result.done()) fs::remove(settings.reflect.checkpoint, ignored);
   CommandResult outcome{json, result_text(settings, result),

@@ -51,6 +51,7 @@ struct ReflectSettings {
   std::string out;   ///< Folder; empty with `evaluate`.
   bool evaluate = false;
   bool resume = false;
+  bool step = false;  ///< Write the shape as STEP, too.
   reflect::ReflectOptions reflect;
 };
 

@@ -26,11 +26,12 @@ inline constexpr const char* kRadarTable = "radar.csv";
 inline constexpr const char* kRadarPlot = "radar.svg";
 inline constexpr const char* kGlareTable = "glare.csv";
 inline constexpr const char* kGlareMap = "glare.svg";
+inline constexpr const char* kSolid = "surface.step";  ///< If it is asked for.
 /// Checkpoint of an unfinished run; write_result() does not touch it.
 inline constexpr const char* kCheckpoint = "reflect.checkpoint";
-inline constexpr std::array kAll{kRadarTable,   kRadarPlot,   kGlareTable, kGlareMap,
-                                 kSurface,      kPrint,       kReference,  kViews,
-                                 kDisplacement, kConvergence, kReport,     kJson};
+inline constexpr std::array kAll{kRadarTable, kRadarPlot, kGlareTable, kGlareMap,     kSurface,
+                                 kPrint,      kReference, kViews,      kDisplacement, kConvergence,
+                                 kReport,     kJson,      kSolid};
 }  // namespace reflect_file
 
 /// @throw InputError if `folder` has a file of these names that lensforge did not write, unless
@@ -43,7 +44,7 @@ bool holds_result(const std::filesystem::path& folder, std::uint64_t fingerprint
 /// A result in the format of reflect.json: energies before and after, displacements, options.
 nlohmann::json result_json(const ReflectResult& result, const ReflectOptions& options);
 
-/// Writes all files of a result and renames them together. @return their paths.
+/// Writes all files of a result but kSolid and renames them together. @return their paths.
 /// @throw RunError
 std::vector<std::filesystem::path> write_result(const ReflectResult& result,
                                                 const ReflectOptions& options,

@@ -228,6 +228,11 @@ SolidContent write_guarded(const std::filesystem::path& path, const RunControl& 
 void require_read_back(const SolidContent& content, double volume,
                        const std::filesystem::path& path) {
   if (!content.is_one_solid()) fail_to_write(path, "it does not read back as one closed solid");
+  require_same_volume(content, volume, path);
+}
+
+void require_same_volume(const SolidContent& content, double volume,
+                         const std::filesystem::path& path) {
   if (is_same_volume(content.volume, volume)) return;
   fail_to_write(path, "it reads back with a volume of " + std::to_string(content.volume) +
                           " mm^3 instead of " + std::to_string(volume));

@@ -73,6 +73,10 @@ SolidContent write_guarded(const std::filesystem::path& path, const RunControl& 
 void require_read_back(const SolidContent& content, double volume,
                        const std::filesystem::path& path);
 
+/// @throw RunError naming `path` unless `content` has a volume, mm³.
+void require_same_volume(const SolidContent& content, double volume,
+                         const std::filesystem::path& path);
+
 /// @throw RunError "cannot be written".
 [[noreturn]] void fail_to_write(const std::filesystem::path& path, const std::string& why);
 

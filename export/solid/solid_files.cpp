@@ -2,6 +2,11 @@
 #include "export/solid/solid_files.h"
 
 #include <APIHeaderSection_MakeHeader.hxx>
+#include <BRepBuilderAPI_MakeEdge.hxx>
+#include <BRepBuilderAPI_MakeFace.hxx>
+#include <BRepBuilderAPI_MakeVertex.hxx>
+#include <BRepBuilderAPI_MakeWire.hxx>
+#include <BRep_Builder.hxx>
 #include <IGESControl_Controller.hxx>
 #include <IGESControl_Writer.hxx>
 #include <IGESData_GlobalSection.hxx>
@@ -11,6 +16,12 @@
 #include <STEPControl_Controller.hxx>
 #include <STEPControl_Writer.hxx>
 #include <StepRepr_RepresentationItem.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Compound.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Shell.hxx>
+#include <TopoDS_Solid.hxx>
+#include <TopoDS_Vertex.hxx>
 #include <Transfer_FinderProcess.hxx>
 #include <Transfer_TransientProcess.hxx>
 #include <XSControl_TransferWriter.hxx>
@@ -22,13 +33,18 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <gp_Pln.hxx>
+#include <map>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/mesh/surface_mesh.h"
 #include "core/text/words.h"
 #include "export/solid/opencascade_io.h"
 #include "export/solid/solids_module.h"
@@ -281,6 +297,149 @@ SolidContent solids_module::write_step(const SplineNet& net, const StepHeader& h
       return write_beside(net, header, schema, beside, path, inner);
     });
     require_read_back(content, net.volume(), path);
+  });
+  return content;
+}
+
+namespace {
+
+/// A mesh's triangles as faces that share edges and vertices.
+class MeshShape {
+ public:
+  explicit MeshShape(const SurfaceMesh& mesh)
+      : mesh_(mesh), piece_of_(index_of(mesh.vertex_count())) {
+    for (const Eigen::Vector3d p : mesh.vertices.colwise()) {
+      vertices_.push_back(BRepBuilderAPI_MakeVertex(gp_Pnt(p.x(), p.y(), p.z())).Vertex());
+    }
+    std::iota(piece_of_.begin(), piece_of_.end(), 0);
+    for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
+      for (int k = 1; k < 3; ++k) {
+        piece_of_[index_of(piece(mesh.triangles(k, t)))] = piece(mesh.triangles(0, t));
+      }
+    }
+  }
+
+  /// Every piece as a solid if it is closed, else as a shell.
+  [[nodiscard]] TopoDS_Shape shape() {
+    std::map<int, TopoDS_Shell> shells;
+    for (std::int64_t t = 0; t < mesh_.triangle_count(); ++t) {
+      const auto [at, fresh] = shells.try_emplace(piece(mesh_.triangles(0, t)));
+      if (fresh) builder_.MakeShell(at->second);
+      builder_.Add(at->second, face(t));
+    }
+    std::map<int, bool> open;
+    for (const auto& [ends, edge] : edges_) {
+      if (edge.faces != 2) open[piece(ends.first)] = true;
+    }
+    TopoDS_Compound all;
+    builder_.MakeCompound(all);
+    for (auto& [piece, shell] : shells) {
+      shell.Closed(!open.contains(piece));
+      all_closed_ = all_closed_ && shell.Closed();
+      add(shell, all);
+    }
+    return all;
+  }
+  /// mm³; none unless all pieces are closed. @pre shape() was called
+  [[nodiscard]] std::optional<double> volume() const {
+    if (!all_closed_) return std::nullopt;
+    double sum = 0.0;
+    for (std::int64_t t = 0; t < mesh_.triangle_count(); ++t) {
+      const Corners c = mesh_.corners(t);
+      sum += c.v0.dot(c.v1.cross(c.v2)) / 6.0;
+    }
+    return sum;
+  }
+
+ private:
+  struct SharedEdge {
+    TopoDS_Edge edge;
+    int faces = 0;
+  };
+
+  static std::size_t index_of(std::int64_t i) { return static_cast<std::size_t>(i); }
+
+  /// A vertex of the piece that a vertex belongs to, the same for all of it.
+  [[nodiscard]] int piece(int vertex) {
+    int& of = piece_of_[index_of(vertex)];
+    while (of != piece_of_[index_of(of)]) of = piece_of_[index_of(of)];
+    return of;
+  }
+
+  [[nodiscard]] TopoDS_Edge edge(int from, int to) {
+    const auto ends = std::minmax(from, to);
+    SharedEdge& shared = edges_[ends];
+    if (shared.faces++ == 0) {
+      shared.edge = BRepBuilderAPI_MakeEdge(vertices_[index_of(ends.first)],
+                                            vertices_[index_of(ends.second)]);
+    }
+    return TopoDS::Edge(from == ends.first ? shared.edge : shared.edge.Reversed());
+  }
+
+  [[nodiscard]] TopoDS_Face face(std::int64_t t) {
+    BRepBuilderAPI_MakeWire wire;
+    for (int k = 0; k < 3; ++k) {
+      wire.Add(edge(mesh_.triangles(k, t), mesh_.triangles((k + 1) % 3, t)));
+    }
+    const Corners c = mesh_.corners(t);
+    const Eigen::Vector3d n = area_normal(c).normalized();
+    const gp_Pln plane(gp_Pnt(c.v0.x(), c.v0.y(), c.v0.z()), gp_Dir(n.x(), n.y(), n.z()));
+    return BRepBuilderAPI_MakeFace(plane, wire);
+  }
+
+  void add(const TopoDS_Shell& shell, TopoDS_Compound& all) {
+    if (!shell.Closed()) return builder_.Add(all, shell);
+    TopoDS_Solid solid;
+    builder_.MakeSolid(solid);
+    builder_.Add(solid, shell);
+    builder_.Add(all, solid);
+  }
+
+  const SurfaceMesh& mesh_;
+  BRep_Builder builder_;
+  std::vector<TopoDS_Vertex> vertices_;
+  std::vector<int> piece_of_;  ///< By vertex: another vertex of its piece, or itself.
+  std::map<std::pair<int, int>, SharedEdge> edges_;  ///< By the lower and the higher vertex.
+  bool all_closed_ = true;
+};
+
+/// Body of the child process.
+SolidContent write_mesh_beside(const SurfaceMesh& mesh, const StepHeader& header,
+                               const fs::path& beside, const fs::path& path,
+                               const RunControl& control) {
+  silence_opencascade();
+  solid_step("making faces", control);
+  MeshShape faces(mesh);
+  const TopoDS_Shape made = faces.shape();
+  set_up_writing(header, StepSchema::kAp214, false);
+  STEPControl_Writer writer;
+  solid_step("converting", control);
+  if (writer.Transfer(made, STEPControl_AsIs) != IFSelect_RetDone) {
+    fail_to_write(path, "OpenCASCADE cannot put the mesh into STEP");
+  }
+  fill_header(header, writer);
+  solid_step("writing lines", control);
+  errno = 0;
+  if (writer.Write(beside.c_str()) != IFSelect_RetDone) fail_to_write(path, last_system_error());
+  const TopoDS_Shape read = read_step_shape(beside, solid_step("reading back", control));
+  solid_step("checking", control);
+  SolidContent content = inspect_shape(read, faces.volume());
+  if (content.faces != mesh.triangle_count() || !content.valid) {
+    fail_to_write(path, "it does not read back as the mesh's faces");
+  }
+  if (faces.volume()) require_same_volume(content, *faces.volume(), path);
+  return content;
+}
+
+}  // namespace
+
+SolidContent solids_module::write_mesh_step(const SurfaceMesh& mesh, const StepHeader& header,
+                                            const fs::path& path, const RunControl& control) {
+  SolidContent content;
+  write_whole_file(path, [&](const fs::path& beside) {
+    content = write_guarded(path, control, [&](const RunControl& inner) {
+      return write_mesh_beside(mesh, header, beside, path, inner);
+    });
   });
   return content;
 }

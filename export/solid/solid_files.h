@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/compute/executor.h"
+#include "core/mesh/surface_mesh.h"
 #include "export/spline/spline_net.h"
 
 namespace lensforge {
@@ -32,6 +33,9 @@ struct StepHeader {
   std::string time_stamp;  ///< ISO 8601. Given by the caller: the same input gives the same bytes.
 };
 
+/// When a file was written, as StepHeader::time_stamp; empty if that is not known.
+std::string file_time(const std::filesystem::path& file);
+
 /// Content of a file of solids, according to OpenCASCADE.
 struct SolidContent {
   int solids = 0;
@@ -54,6 +58,16 @@ struct SolidContent {
 ///      Interrupted, and then nothing was written.
 SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
                         const std::filesystem::path& path, const RunControl& control = {});
+
+/// Writes a mesh as STEP (AP214) in millimetres: every triangle is a flat face that shares its
+/// edges with its neighbours; every closed piece of the mesh is a solid, every open one a shell.
+/// The file is read back before it appears under its name: as many faces, valid, and of closed
+/// pieces the mesh's volume to 1e-6.
+/// @pre an edge has at most two triangles, which run along it in opposite directions.
+/// @throw RunError if it cannot be written, as with sides below 1e-7 mm, or does not read back so;
+///        Interrupted, and then nothing was written.
+SolidContent write_mesh_step(const SurfaceMesh& mesh, const StepHeader& header,
+                             const std::filesystem::path& path, const RunControl& control = {});
 
 /// Reads a STEP file. OpenCASCADE runs in a child process; its crash is an InputError too.
 /// @throw InputError if the file cannot be read or holds no shape; Interrupted.

@@ -709,6 +709,7 @@ extern "C" const lensforge::ModuleHead* lensforge_solids() {
   static const module::Table table{.head = {lensforge::module_mark(), sizeof(module::Table)},
                                    .check_part21 = module::check_part21,
                                    .write_step = module::write_step,
+                                   .write_mesh_step = module::write_mesh_step,
                                    .inspect_step = module::inspect_step,
                                    .check_iges = module::check_iges,
                                    .write_iges = module::write_iges,

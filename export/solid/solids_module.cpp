@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/solid/solids_module.h"
 
+#include <sys/stat.h>
+
+#include <array>
+#include <ctime>
+
 namespace lensforge {
 namespace {
 
@@ -14,6 +19,15 @@ const solids_module::Table& table() {
 
 }  // namespace
 
+std::string file_time(const fs::path& file) {
+  struct stat about {};
+  if (::stat(file.c_str(), &about) != 0) return {};
+  std::tm utc{};
+  ::gmtime_r(&about.st_mtime, &utc);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc)};
+}
+
 std::int64_t check_part21(std::string_view content, const std::string& name) {
   return table().check_part21(content, name);
 }
@@ -21,6 +35,11 @@ std::int64_t check_part21(std::string_view content, const std::string& name) {
 SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
                         const fs::path& path, const RunControl& control) {
   return table().write_step(net, header, schema, path, control);
+}
+
+SolidContent write_mesh_step(const SurfaceMesh& mesh, const StepHeader& header,
+                             const fs::path& path, const RunControl& control) {
+  return table().write_mesh_step(mesh, header, path, control);
 }
 
 SolidContent inspect_step(const fs::path& path, const RunControl& control) {

@@ -17,6 +17,8 @@ namespace lensforge::solids_module {
 std::int64_t check_part21(std::string_view content, const std::string& name);
 SolidContent write_step(const SplineNet& net, const StepHeader& header, StepSchema schema,
                         const std::filesystem::path& path, const RunControl& control);
+SolidContent write_mesh_step(const SurfaceMesh& mesh, const StepHeader& header,
+                             const std::filesystem::path& path, const RunControl& control);
 SolidContent inspect_step(const std::filesystem::path& path, const RunControl& control);
 
 std::int64_t check_iges(std::string_view content, const std::string& name);
@@ -32,6 +34,7 @@ struct Table {
   ModuleHead head;
   decltype(&solids_module::check_part21) check_part21;
   decltype(&solids_module::write_step) write_step;
+  decltype(&solids_module::write_mesh_step) write_mesh_step;
   decltype(&solids_module::inspect_step) inspect_step;
   decltype(&solids_module::check_iges) check_iges;
   decltype(&solids_module::write_iges) write_iges;
