@@ -15,6 +15,7 @@
 #include "core/text/number_text.h"
 #include "design/reflect.h"
 #include "design/reflect/radar.h"
+#include "design/reflect/radar_goal.h"
 #include "export/solid/solid_reading.h"
 
 namespace lensforge::app {
@@ -70,6 +71,11 @@ nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settin
                      {"mean_dbsm", reflect::mean_dbsm(
                                        reflect::radar_sections(mesh, settings.reflect, executor))}};
   }
+  if (settings.reflect.goal == reflect::GoalKind::kRadar) {
+    json["radar"] = {{"ghz", reflect::radar_sector(settings.reflect, mesh).ghz},
+                     {"polarization", reflect::polarization_word(settings.reflect.polarization)},
+                     {"mean_dbsm", reflect::mean_dbsm({energies.total})}};
+  }
   return json;
 }
 
@@ -82,7 +88,7 @@ CommandResult evaluate(CommandFrame& frame, const ReflectSettings& settings) {
                      number_text(json["energy_direct"]) + ", of one and two " +
                      number_text(json["energy"]) + "\n";
   if (json.contains("radar")) {
-    text += "  radar cross-section around the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
+    text += "  radar cross-section on the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
             " dBsm on average\n";
   }
   return {json, text};
@@ -92,7 +98,7 @@ std::string percent(double share, int digits) { return fixed(100.0 * share, digi
 
 std::string radar_text(const reflect::ReflectResult& result) {
   if (!result.radar) return "";
-  return "  radar cross-section around the horizon " +
+  return "  radar cross-section on the horizon " +
          fixed(reflect::mean_dbsm(result.radar->before), 1) + " -> " +
          fixed(reflect::mean_dbsm(result.radar->after), 1) + " dBsm on average\n";
 }

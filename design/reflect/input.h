@@ -20,6 +20,7 @@ enum class GoalKind {
   kPoint,    ///< As much as possible goes to a point.
   kLine,     ///< As much as possible goes to the nearest point of a line.
   kDeflect,  ///< As little as possible goes to a point.
+  kRadar,    ///< As little as possible of a radar's wave goes back to it.
 };
 
 /// Reflected energy 5·½ Σ a_k ⟨L² V⟩ of a shape, by one reflection alone and by one and two.
@@ -72,7 +73,10 @@ struct ReflectOptions {
   double min_thickness = 0.0;     ///< Minimum of the material behind a vertex; 0: none.
   double radar_ghz = 0.0;         ///< Frequency of radar cross-sections; 0: none.
   Polarization polarization = Polarization::kVertical;  ///< Of the radar.
-  bool force = false;  ///< Replace files that lensforge did not write.
+  std::string frequency;                                ///< "GHZ,GHZ,…" of --goal radar.
+  std::string sector;      ///< "FROM,TO,STEP" of --goal radar, degrees; empty: all around.
+  int radar_updates = 30;  ///< Vertex updates of --goal radar.
+  bool force = false;      ///< Replace files that lensforge did not write.
   /// File that takes a checkpoint every second; none is written if empty.
   std::filesystem::path checkpoint;
   /// Continue from `checkpoint`. The same mesh and options give the same shape as without
