@@ -112,7 +112,7 @@ void describe(Description& d, ReflectOptions& o) {
            "0 computes none");
   d.word("--polarization", o.polarization,
          {{"vv", Polarization::kVertical}, {"hh", Polarization::kHorizontal}},
-         "of --radar: the electric field sent and received is vertical or horizontal");
+         "of a radar: the electric field sent and received is vertical or horizontal");
   describe_radar_goal(d, o);
   d.flag("--force", o.force, "replace files that lensforge did not write").left_out =
       "it does not change the shape";

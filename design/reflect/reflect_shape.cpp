@@ -197,7 +197,10 @@ class Schedule {
 
   void run_stage(int number) {
     begin_stage(number);
-    if (sector_) return run_radar_stage();
+    if (sector_) {
+      run_radar_stage();
+      return;
+    }
     UnmetTurns unmet(state_.unmet);
     const Stage stage = stage_of(number);
     if (stage.updates == 0) return;
