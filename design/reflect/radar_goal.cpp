@@ -124,6 +124,10 @@ TriangleWave triangle_wave(const std::array<double, 3>& phase) {
 
 namespace {
 
+/// Azimuths are no farther apart than λ/(6 R). With Nyquist's λ/(4 R) the rocket's mean in between
+/// them ended 2.4 dB higher.
+constexpr double kStepsPerRadius = 6.0;
+
 constexpr double kMinGhz = 0.01;
 constexpr double kMaxGhz = 1000.0;
 constexpr std::size_t kMaxFrequencies = 64;
@@ -201,7 +205,7 @@ RadarSector radar_sector(const ReflectOptions& options, const SurfaceMesh& mesh)
   const Eigen::Vector2d middle = 0.5 * (flat.rowwise().maxCoeff() + flat.rowwise().minCoeff());
   const double radius = (flat.colwise() - middle).colwise().norm().maxCoeff();
   const SectorRange range = sector_range(options.sector);
-  const double finest = wavelength / (4.0 * radius) / kDegree;
+  const double finest = wavelength / (kStepsPerRadius * radius) / kDegree;
   const double step = range.step / std::max(1.0, std::ceil(range.step / finest));
   const auto steps = static_cast<int>(std::floor((range.to - range.from) / step + 1e-9));
   const bool around = range.to - range.from > 360.0 - 0.5 * step;

@@ -38,7 +38,7 @@ struct RadarSector {
 void require_radar_goal(const ReflectOptions& options);
 
 /// The frequencies and the sector of the options. Between the sector's azimuths lie as many others
-/// as `mesh`, in millimetres, needs: at λ/(4 R) no lobe hides between two of them, where R is the
+/// as `mesh`, in millimetres, needs: at λ/(6 R) no lobe hides between two of them, where R is the
 /// largest distance from the vertical axis. @throw InputError naming --frequency or --sector
 RadarSector radar_sector(const ReflectOptions& options, const SurfaceMesh& mesh);
 

@@ -97,14 +97,14 @@ TEST(RadarEchoes, GradientMatchesFiniteDifferences) {
 
 TEST(RadarSector, HasMoreAzimuthsWhereLobesAreNarrow) {
   ReflectOptions options = radar_options();
-  EXPECT_EQ(radar_sector(options, body(1)).azimuth_deg.size(), 72U);
+  EXPECT_EQ(radar_sector(options, body(1)).azimuth_deg.size(), 108U);
   options.sector = "-30,30,2";
   const RadarSector narrow = radar_sector(options, body(1));
   EXPECT_EQ(narrow.azimuth_deg.size(), 31U);
   EXPECT_EQ(narrow.azimuth_deg.front(), -30.0);
   EXPECT_NEAR(narrow.azimuth_deg.back(), 30.0, 1e-9);
   options.frequency = "9,10,100";
-  EXPECT_EQ(radar_sector(options, body(1)).azimuth_deg.size(), 91U);
+  EXPECT_EQ(radar_sector(options, body(1)).azimuth_deg.size(), 151U);
 }
 
 TEST(RadarGoal, LowersTheMeanAndTheRestOfTheComputationConfirmsIt) {
