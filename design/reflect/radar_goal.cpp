@@ -109,7 +109,7 @@ TriangleWave narrow_wave(const std::array<double, 3>& phase) {
 
 }  // namespace
 
-TriangleWave triangle_wave(const std::array<double, 3>& phase) {
+TriangleWave wave_with_slopes(const std::array<double, 3>& phase) {
   std::array<std::size_t, 3> at{0, 1, 2};
   std::sort(at.begin(), at.end(), [&](auto i, auto j) { return phase[i] < phase[j]; });
   if (phase[at[2]] - phase[at[0]] < kWide) return narrow_wave(phase);
@@ -305,7 +305,7 @@ double RadarEchoes::add(const Echo& echo, const Eigen::Matrix3Xd& vertices,
       p[at] = vertices.col(corner[j]) - middle_;
       phase[at] = along.dot(p[at]);
     }
-    const TriangleWave wave = triangle_wave(phase);
+    const TriangleWave wave = wave_with_slopes(phase);
     const double facing = (p[1] - p[0]).cross(p[2] - p[0]).dot(echo.towards);
     sum += seen.weight * facing * wave.value;
     for (std::size_t j = 0; j < 3; ++j) {
@@ -354,10 +354,10 @@ constexpr double kSmoothness = 2.0 / 3.0;
 constexpr double kRadarReach = 1.0 / 15.0;
 
 /// Iterations of L-BFGS between two looks.
-constexpr int kIterations = 20;
+constexpr int kDescentIterations = 20;
 
 template <class T>
-auto columns(std::span<T> values) {
+auto as_columns(std::span<T> values) {
   using Matrix = std::conditional_t<std::is_const_v<T>, const Eigen::Matrix3Xd, Eigen::Matrix3Xd>;
   return Eigen::Map<Matrix>(values.data(), 3, static_cast<Eigen::Index>(values.size() / 3));
 }
@@ -453,11 +453,11 @@ Eigen::Matrix3Xd RadarDescent::moved(const Eigen::Matrix3Xd& vertices, const Rad
   const double reach = kRadarReach * metric_->options.wavelength;
   Eigen::Matrix3Xd gradient;
   const auto evaluate = [&](std::span<const double> x, std::span<double> out) {
-    const auto step = columns(x);
+    const auto step = as_columns(x);
     const double farthest = step.colwise().norm().maxCoeff();
     if (!(farthest <= reach)) return std::numeric_limits<double>::infinity();
     const double value = metric_->objective(echoes, vertices + step, gradient);
-    columns(out) = gradient;
+    as_columns(out) = gradient;
     return value;
   };
   metric_->objective(echoes, vertices, gradient);
@@ -465,14 +465,14 @@ Eigen::Matrix3Xd RadarDescent::moved(const Eigen::Matrix3Xd& vertices, const Rad
   if (!(longest > 0.0)) return vertices;
   const double scale = 0.25 * reach / longest;  // The first step is a quarter of the reach.
   const auto precondition = [&](std::span<const double> g, std::span<double> r) {
-    columns(r) = scale * metric_->smoothed(columns(g));
+    as_columns(r) = scale * metric_->smoothed(as_columns(g));
   };
   LbfgsOptions options;
-  options.max_iterations = kIterations;
+  options.max_iterations = kDescentIterations;
   std::vector<double> x(static_cast<std::size_t>(vertices.size()), 0.0);
   LbfgsOn<Executor>(evaluate, precondition, options, executor)
       .run([](int, double) { return true; }, x);
-  return vertices + columns(std::span<const double>(x));
+  return vertices + as_columns(std::span<const double>(x));
 }
 
 }  // namespace lensforge::reflect

@@ -25,7 +25,7 @@ struct TriangleWave {
 
 /// Divided differences of e^{ix} (Hermite–Genocchi), with a power series where the phases hardly
 /// differ. Error below 1e-7.
-TriangleWave triangle_wave(const std::array<double, 3>& phase);
+TriangleWave wave_with_slopes(const std::array<double, 3>& phase);
 
 /// Frequencies and azimuths on the horizon over which --goal radar averages.
 struct RadarSector {

@@ -46,7 +46,7 @@ TEST(TriangleWave, IsTheIntegralAndItsDerivatives) {
       std::array<double, 3> phase{2.0 + width * spread(random), 2.0 + width * spread(random), 2.0};
       if (i % 4 == 1) phase[1] = phase[0];
       if (i % 4 == 2) phase[2] = phase[0] + 1e-4 * width;
-      const TriangleWave wave = triangle_wave(phase);
+      const TriangleWave wave = wave_with_slopes(phase);
       EXPECT_LT(std::abs(wave.value - summed_wave(phase, 200)), 1e-5 * (1.0 + width * width));
       for (std::size_t j = 0; j < 3; ++j) {
         constexpr double kStep = 1e-4;
@@ -54,7 +54,8 @@ TEST(TriangleWave, IsTheIntegralAndItsDerivatives) {
         std::array<double, 3> less = phase;
         more[j] += kStep;
         less[j] -= kStep;
-        const Complex slope = (triangle_wave(more).value - triangle_wave(less).value) / (2 * kStep);
+        const Complex slope =
+            (wave_with_slopes(more).value - wave_with_slopes(less).value) / (2 * kStep);
         EXPECT_LT(std::abs(wave.by_phase[j] - slope), 1e-7) << width << " " << i;
       }
     }
