@@ -6,7 +6,8 @@
 #include "design/reflect/result_files.h"
 
 /// Deforms a mesh so that its reflection meets a goal: no light back to its source, light to a
-/// point or a line, or no light to a point (Tojo et al.). Meshes are read by core (read_mesh()),
+/// point or a line, or no light to a point (Tojo et al.); or so that little of a radar's wave goes
+/// back. Meshes are read by core (read_mesh()),
 /// solids by export (read_solid_mesh()).
 ///
 ///     reflect::ReflectOptions options;

@@ -19,6 +19,7 @@
 #include "design/reflect.h"
 #include "design/reflect/glare.h"
 #include "design/reflect/radar.h"
+#include "design/reflect/radar_goal.h"
 #include "export/solid/solid_files.h"
 #include "export/solid/solid_reading.h"
 
@@ -77,6 +78,11 @@ nlohmann::json evaluated(const OptionSet& options, const ReflectSettings& settin
                      {"mean_dbsm", reflect::mean_dbsm(
                                        reflect::radar_sections(mesh, settings.reflect, executor))}};
   }
+  if (settings.reflect.goal == reflect::GoalKind::kRadar) {
+    json["radar"] = {{"ghz", reflect::radar_sector(settings.reflect, mesh).ghz},
+                     {"polarization", reflect::polarization_word(settings.reflect.polarization)},
+                     {"mean_dbsm", reflect::mean_dbsm({energies.total})}};
+  }
   if (!settings.reflect.glare.empty()) {
     const reflect::GlareSetup setup = reflect::make_glare_setup(settings.reflect);
     json["glare"] = reflect::glare_json(setup);
@@ -106,7 +112,7 @@ CommandResult evaluate(CommandFrame& frame, const ReflectSettings& settings) {
                      number_text(json["energy_direct"]) + ", of one and two " +
                      number_text(json["energy"]) + "\n";
   if (json.contains("radar")) {
-    text += "  radar cross-section around the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
+    text += "  radar cross-section on the horizon " + fixed(json["radar"]["mean_dbsm"], 1) +
             " dBsm on average\n";
   }
   if (json.contains("glare")) {
@@ -119,7 +125,7 @@ std::string percent(double share, int digits) { return fixed(100.0 * share, digi
 
 std::string radar_text(const reflect::ReflectResult& result) {
   if (!result.radar) return "";
-  return "  radar cross-section around the horizon " +
+  return "  radar cross-section on the horizon " +
          fixed(reflect::mean_dbsm(result.radar->before), 1) + " -> " +
          fixed(reflect::mean_dbsm(result.radar->after), 1) + " dBsm on average\n";
 }

@@ -287,10 +287,10 @@ void require_glare_options(const ReflectOptions& options) {
 }
 
 GlareSetup make_glare_setup(const ReflectOptions& options) {
-  if (options.goal == GoalKind::kLine) {
-    throw InputError(
-        "--glare: --goal line has no place for it; must be with stealth, point or "
-        "deflect");
+  if (options.goal == GoalKind::kLine || options.goal == GoalKind::kRadar) {
+    throw InputError(std::string("--glare: --goal ") +
+                     (options.goal == GoalKind::kLine ? "line" : "radar") +
+                     " has no place for it; must be with stealth, point or deflect");
   }
   GlareSetup setup;
   setup.site = site_of(options.glare);

@@ -22,6 +22,7 @@
 #include "design/reflect/light/light_field.h"
 #include "design/reflect/mesh/faces.h"
 #include "design/reflect/radar.h"
+#include "design/reflect/radar_goal.h"
 
 namespace lensforge::reflect {
 namespace {
@@ -70,6 +71,15 @@ void describe_glare(Description& d, ReflectOptions& o) {
            "Linke's turbidity of the clear sky: 2 clear and dry, 3 usual, 5 hazy");
 }
 
+void describe_radar_goal(Description& d, ReflectOptions& o) {
+  d.text("--frequency", o.frequency, "GHZ[,GHZ...]",
+         "of --goal radar, for a mesh in millimetres: one, or several over a band");
+  d.text("--sector", o.sector, "FROM,TO,STEP",
+         "of --goal radar: azimuths in degrees from +x towards +y; without it 0,360,2");
+  d.whole("--radar-updates", o.radar_updates, Limits::between(1, kMaxUpdates),
+          "updates of the vertices of --goal radar");
+}
+
 }  // namespace
 
 void describe(Description& d, ReflectOptions& o) {
@@ -77,9 +87,10 @@ void describe(Description& d, ReflectOptions& o) {
          {{"stealth", GoalKind::kStealth},
           {"point", GoalKind::kPoint},
           {"line", GoalKind::kLine},
-          {"deflect", GoalKind::kDeflect}},
+          {"deflect", GoalKind::kDeflect},
+          {"radar", GoalKind::kRadar}},
          "send little light back to where it comes from, much of it to a point or "
-         "to a line, or little of it to a point");
+         "to a line, little of it to a point, or little of a radar's wave back");
   d.text("--place", o.place, "X,Y,Z[,X,Y,Z]|FILE",
          "the point of --goal point and deflect and of --glare, or the two ends of the line; with "
          "--glare also a file with a line X,Y,Z for every point, or a mesh whose vertices are "
@@ -121,7 +132,8 @@ void describe(Description& d, ReflectOptions& o) {
            "0 computes none");
   d.word("--polarization", o.polarization,
          {{"vv", Polarization::kVertical}, {"hh", Polarization::kHorizontal}},
-         "of --radar: the electric field sent and received is vertical or horizontal");
+         "of a radar: the electric field sent and received is vertical or horizontal");
+  describe_radar_goal(d, o);
   describe_glare(d, o);
   d.flag("--force", o.force, "replace files that lensforge did not write").left_out =
       "it does not change the shape";
@@ -131,6 +143,7 @@ void validate(const ReflectOptions& options) {
   require_limits(options);
   require_glare_options(options);
   make_light_field(options);
+  require_radar_goal(options);
 }
 
 namespace {
@@ -590,9 +603,10 @@ ReflectInput prepared_input(const SurfaceMesh& mesh, const std::string& name,
                             " to " + std::to_string(input.mesh.triangle_count()) + " faces");
   }
   if (options.radar_ghz > 0.0) {
-    require_radar_size(input.mesh, radar_wavelength(options.radar_ghz));
+    require_radar_size(input.mesh, radar_wavelength(options.radar_ghz), "--radar");
   }
   if (!options.glare.empty()) require_glare_places(input.mesh, make_glare_setup(options));
+  if (options.goal == GoalKind::kRadar) radar_sector(options, input.mesh);
   find_fixed(options, repaired, input);
   if (!options.planar_faces.empty()) {
     input.planar = planar_groups(options, mesh.triangle_count(), repaired);

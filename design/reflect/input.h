@@ -20,6 +20,7 @@ enum class GoalKind {
   kPoint,    ///< As much as possible goes to a point.
   kLine,     ///< As much as possible goes to the nearest point of a line.
   kDeflect,  ///< As little as possible goes to a point.
+  kRadar,    ///< As little as possible of a radar's wave goes back to it.
 };
 
 /// Reflected energy 5·½ Σ a_k ⟨L² V⟩ of a shape, by one reflection alone and by one and two.
@@ -74,6 +75,9 @@ struct ReflectOptions {
   double min_thickness = 0.0;     ///< Minimum of the material behind a vertex; 0: none.
   double radar_ghz = 0.0;         ///< Frequency of radar cross-sections; 0: none.
   Polarization polarization = Polarization::kVertical;  ///< Of the radar.
+  std::string frequency;                                ///< "GHZ,GHZ,…" of --goal radar.
+  std::string sector;        ///< "FROM,TO,STEP" of --goal radar, degrees; empty: all around.
+  int radar_updates = 30;    ///< Vertex updates of --goal radar.
   std::string glare;         ///< "LAT,LON[,ZONE]": reflected sunlight at the place; empty: none.
   double glare_limit = 0.0;  ///< W/m² whose hours are counted; 0: none.
   double glare_north_deg = 0.0;  ///< Bearing of +y, clockwise from north.

@@ -298,22 +298,27 @@ class RadarBody::View {
         v_(towards.cross(u_)),
         field_(radar_field(towards, polarization)) {}
 
-  /// One bounce: (n·ω) ∫ e^{−2ikω·r} dA over a face, weighted by its visible share and for its
-  /// curvature.
-  [[nodiscard]] std::array<double, 2> face(std::int64_t k) const {
+  /// The weight of a face's integral: its visible share, and its curvature's; 0 if it is hidden.
+  [[nodiscard]] std::complex<double> weight(std::int64_t k) const {
     const Corners c = body_.mesh_.corners(k);
-    Vector3d twice = area_normal(c);
-    const bool behind = twice.dot(towards_) < 0.0;  // Seen through an open mesh.
-    if (behind) twice = -twice;
-    const Vector3d n = twice.normalized();
+    Vector3d n = body_.faces_.normal.col(k);
+    const bool behind = n.dot(towards_) < 0.0;  // Seen through an open mesh.
+    if (behind) n = -n;
     const Vector3d middle = (c.v0 + c.v1 + c.v2) / 3.0;
     const double share =
         seen_share(std::array{middle, Vector3d(0.5 * (middle + c.v0)),
                               Vector3d(0.5 * (middle + c.v1)), Vector3d(0.5 * (middle + c.v2))},
                    n);
-    if (share == 0.0) return {};
-    const std::complex<double> curved = behind ? 1.0 : body_.curved_[index_of(k)].of(field_, n);
-    const std::complex<double> wave = share * curved * twice.dot(towards_) *
+    if (share == 0.0 || behind) return -share;
+    return share * body_.curved_[index_of(k)].of(field_, n);
+  }
+
+  /// One bounce: (n·ω) ∫ e^{−2ikω·r} dA over a face, weighted.
+  [[nodiscard]] std::array<double, 2> face(std::int64_t k) const {
+    const std::complex<double> seen = weight(k);
+    if (seen == 0.0) return {};
+    const Corners c = body_.mesh_.corners(k);
+    const std::complex<double> wave = seen * area_normal(c).dot(towards_) *
                                       triangle_wave({phase(c.v0), phase(c.v1), phase(c.v2)});
     return {wave.real(), wave.imag()};
   }
@@ -407,7 +412,6 @@ RadarBody::RadarBody(const SurfaceMesh& mesh, double wavelength)
       middle_(0.5 * (mesh.vertices.rowwise().maxCoeff() + mesh.vertices.rowwise().minCoeff())),
       radius_(0.5 * bounding_diagonal(mesh)),
       wave_number_(2.0 * pi / wavelength) {
-  require_radar_size(mesh, wavelength);
   std::vector<bool> creased(static_cast<std::size_t>(mesh.vertex_count()));
   for (const RadarEdge& edge : edges_) {
     for (const int v : edge.vertices) creased[index_of(v)] = true;
@@ -417,8 +421,8 @@ RadarBody::RadarBody(const SurfaceMesh& mesh, double wavelength)
   cell_ = 2.0 * radius_ / static_cast<double>(tubes_);
 }
 
-std::complex<double> RadarBody::amplitude(const Vector3d& towards, Polarization polarization,
-                                          const Executor& executor) const {
+RadarParts RadarBody::parts(const Vector3d& towards, Polarization polarization,
+                            const Executor& executor) const {
   const View view(*this, towards, polarization);
   const auto row = [&](std::int64_t r) { return view.row(r); };
   const auto tubes = parallel_sum<2>(executor, "radar tubes", tubes_, row, 4);
@@ -427,12 +431,27 @@ std::complex<double> RadarBody::amplitude(const Vector3d& towards, Polarization 
   const auto edge = [&](std::int64_t k) { return view.edge(k); };
   const auto edges = parallel_sum<2>(executor, "radar edges", std::ssize(edges_), edge, 64);
   const double area = cell_ * cell_;
-  return {area * tubes[0] + faces[0] + edges[0], area * tubes[1] + faces[1] + edges[1]};
+  return {{faces[0], faces[1]}, {edges[0], edges[1]}, {area * tubes[0], area * tubes[1]}};
 }
+
+std::vector<SeenFace> RadarBody::seen_faces(const Vector3d& towards, Polarization polarization,
+                                            const Executor& executor) const {
+  const View view(*this, towards, polarization);
+  std::vector<std::complex<double>> weight(index_of(mesh_.triangle_count()));
+  const auto look = [&](std::int64_t k) { weight[index_of(k)] = view.weight(k); };
+  parallel_for(executor, "radar faces", mesh_.triangle_count(), look, 64);
+  std::vector<SeenFace> seen;
+  for (int k = 0; k < mesh_.triangle_count(); ++k) {
+    if (weight[index_of(k)] != 0.0) seen.push_back({k, weight[index_of(k)]});
+  }
+  return seen;
+}
+
+double RadarBody::section_scale() const { return wave_number_ * wave_number_ / pi; }
 
 double RadarBody::cross_section(const Vector3d& towards, Polarization polarization,
                                 const Executor& executor) const {
-  return wave_number_ * wave_number_ / pi * std::norm(amplitude(towards, polarization, executor));
+  return section_scale() * std::norm(parts(towards, polarization, executor).total());
 }
 
 Vector3d radar_field(const Vector3d& towards, Polarization polarization) {
@@ -441,10 +460,11 @@ Vector3d radar_field(const Vector3d& towards, Polarization polarization) {
   return polarization == Polarization::kHorizontal ? across : Vector3d(towards.cross(across));
 }
 
-void require_radar_size(const SurfaceMesh& mesh, double wavelength) {
+void require_radar_size(const SurfaceMesh& mesh, double wavelength, const char* option) {
   const double most = std::sqrt(kMaxRadarRays);
   if (tubes_across(mesh, wavelength) <= most) return;
-  throw InputError("--radar: the mesh is " + number_text(bounding_diagonal(mesh) / wavelength, 4) +
+  throw InputError(std::string(option) + ": the mesh is " +
+                   number_text(bounding_diagonal(mesh) / wavelength, 4) +
                    " wavelengths across: must be at most " +
                    number_text(most / kTubesPerWavelength, 4) + "; lower the frequency");
 }
@@ -472,17 +492,19 @@ constexpr int kRings = 6;
 double dbsm(double section) { return 10.0 * std::log10(std::max(section, kFloor)); }
 
 /// @param outer  dBsm of the outermost ring.
-std::string curve(const std::vector<double>& values, double outer, const std::string& colour) {
+std::string curve(const std::vector<double>& azimuth_deg, const std::vector<double>& values,
+                  double outer, const std::string& colour) {
   std::string points;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const double angle =
-        2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(values.size());
+    const double angle = azimuth_deg[i] * kDegree;
     const double rings = std::max(0.0, kRings - (outer - dbsm(values[i])) / 10.0);
     points.append(decimal_text(kHalf + kRing * rings * std::cos(angle), 1)).append(",");
     points.append(decimal_text(kHalf - kRing * rings * std::sin(angle), 1)).append(" ");
   }
-  return "<polygon points=\"" + points + "\" fill=\"none\" stroke=\"" + colour +
-         "\" stroke-width=\"2\"/>\n";
+  const double gap = azimuth_deg.front() + 360.0 - azimuth_deg.back();
+  const bool closed = values.size() < 2 || gap < 1.5 * (azimuth_deg[1] - azimuth_deg[0]);
+  return std::string(closed ? "<polygon" : "<polyline") + " points=\"" + points +
+         "\" fill=\"none\" stroke=\"" + colour + "\" stroke-width=\"2\"/>\n";
 }
 
 }  // namespace
@@ -500,8 +522,13 @@ std::vector<double> radar_sections(const SurfaceMesh& mesh, const ReflectOptions
 
 RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after,
                               const ReflectOptions& options, const Executor& executor) {
-  return {options.radar_ghz, options.polarization, radar_sections(before, options, executor),
-          radar_sections(after, options, executor)};
+  RadarComparison comparison{{options.radar_ghz}, options.polarization, {}, {}, {}};
+  for (int i = 0; i < kRadarAzimuths; ++i) {
+    comparison.azimuth_deg.push_back(360.0 * i / kRadarAzimuths);
+  }
+  comparison.before = radar_sections(before, options, executor);
+  comparison.after = radar_sections(after, options, executor);
+  return comparison;
 }
 
 const char* polarization_word(Polarization polarization) {
@@ -513,18 +540,26 @@ double mean_dbsm(const std::vector<double>& sections) {
               static_cast<double>(sections.size()));
 }
 
+double p90_dbsm(std::vector<double> sections) {
+  const auto at = sections.begin() + std::ssize(sections) * 9 / 10;
+  std::nth_element(sections.begin(), at, sections.end());
+  return dbsm(*at);
+}
+
 nlohmann::json radar_json(const RadarComparison& comparison) {
-  return {{"ghz", comparison.ghz},
+  const bool one = comparison.ghz.size() == 1;
+  return {{"ghz", one ? nlohmann::json(comparison.ghz[0]) : nlohmann::json(comparison.ghz)},
           {"polarization", polarization_word(comparison.polarization)},
           {"mean_dbsm_before", mean_dbsm(comparison.before)},
-          {"mean_dbsm_after", mean_dbsm(comparison.after)}};
+          {"mean_dbsm_after", mean_dbsm(comparison.after)},
+          {"p90_dbsm_before", p90_dbsm(comparison.before)},
+          {"p90_dbsm_after", p90_dbsm(comparison.after)}};
 }
 
 std::string radar_csv(const RadarComparison& comparison) {
   std::string text = "# " + program_mark() + "\nazimuth_deg,before_dbsm,after_dbsm\n";
   for (std::size_t i = 0; i < comparison.before.size(); ++i) {
-    const double azimuth = 360.0 * static_cast<double>(i) / kRadarAzimuths;
-    text.append(decimal_text(azimuth, 1)).append(",");
+    text.append(decimal_text(comparison.azimuth_deg[i], 2)).append(",");
     text.append(decimal_text(dbsm(comparison.before[i]), 2)).append(",");
     text.append(decimal_text(dbsm(comparison.after[i]), 2)).append("\n");
   }
@@ -549,7 +584,8 @@ std::string radar_svg(const RadarComparison& comparison) {
                    decimal_text(kHalf - ring * kRing, 0), "\" fill=\"#666\">",
                    decimal_text(outer - 10.0 * (kRings - ring), 0), " dBsm</text>\n"});
   }
-  svg += curve(comparison.before, outer, "#c33") + curve(comparison.after, outer, "#236");
+  svg += curve(comparison.azimuth_deg, comparison.before, outer, "#c33") +
+         curve(comparison.azimuth_deg, comparison.after, outer, "#236");
   return svg +
          "<text x=\"8\" y=\"18\" fill=\"#c33\">before</text>\n<text x=\"8\" y=\"34\" "
          "fill=\"#236\">after</text>\n</svg>\n";

@@ -19,8 +19,8 @@ namespace lensforge::reflect {
 /// Maximum number of rays per direction; a mesh that is larger in wavelengths is refused.
 inline constexpr double kMaxRadarRays = 4e6;
 
-/// @throw InputError naming --radar if a direction takes more than kMaxRadarRays.
-void require_radar_size(const SurfaceMesh& mesh, double wavelength);
+/// @throw InputError naming the option if a direction takes more than kMaxRadarRays.
+void require_radar_size(const SurfaceMesh& mesh, double wavelength, const char* option);
 
 // Edges.
 
@@ -95,11 +95,29 @@ struct CurvedFace {
 std::vector<CurvedFace> curved_faces(const SurfaceMesh& mesh, const std::vector<bool>& creased,
                                      double wavelength);
 
+/// The three parts of a body's amplitude.
+struct RadarParts {
+  std::complex<double> faces;
+  std::complex<double> edges;
+  std::complex<double> bounces;
+
+  /// What one bounce sends back.
+  [[nodiscard]] std::complex<double> direct() const { return faces + edges; }
+  [[nodiscard]] std::complex<double> total() const { return faces + edges + bounces; }
+};
+
+/// A face that the radar sees, with the weight of its integral: its visible share times what its
+/// curvature adds, negative if it is seen from behind.
+struct SeenFace {
+  int face = 0;
+  std::complex<double> weight;
+};
+
 /// A perfectly conducting shape in the waves of a radar.
 class RadarBody {
  public:
   /// @param mesh  must outlive it. @param wavelength  in the mesh's unit, > 0.
-  /// @throw InputError as require_radar_size()
+  /// @pre require_radar_size()
   RadarBody(const SurfaceMesh& mesh, double wavelength);
 
   /// Σ (n·ω) ∫ e^{−2ikω·r} dA over the visible surface, with every face's integral exact (physical
@@ -110,11 +128,21 @@ class RadarBody {
   /// of a wavelength wide, Σ_tubes ΔA (f·e − (d·e)(n·f)/(n·d)) e^{ik·path}. The origin of phases is
   /// the middle of the bounding box; time goes as e^{−iωt}. Same bits for any number of threads.
   /// @throw Interrupted
-  [[nodiscard]] std::complex<double> amplitude(const Eigen::Vector3d& towards,
-                                               Polarization polarization,
-                                               const Executor& executor) const;
+  [[nodiscard]] RadarParts parts(const Eigen::Vector3d& towards, Polarization polarization,
+                                 const Executor& executor) const;
 
-  /// Radar cross-section σ = 4π/λ² |amplitude|², in the square of the mesh's unit.
+  /// The faces whose integrals parts() sums, in their order. @throw Interrupted
+  [[nodiscard]] std::vector<SeenFace> seen_faces(const Eigen::Vector3d& towards,
+                                                 Polarization polarization,
+                                                 const Executor& executor) const;
+
+  /// σ/|amplitude|² = 4π/λ², in the square of the mesh's unit.
+  [[nodiscard]] double section_scale() const;
+
+  /// Origin of the phases.
+  [[nodiscard]] const Eigen::Vector3d& middle() const { return middle_; }
+
+  /// Radar cross-section σ = 4π/λ² |parts().total()|², in the square of the mesh's unit.
   [[nodiscard]] double cross_section(const Eigen::Vector3d& towards, Polarization polarization,
                                      const Executor& executor) const;
 
@@ -147,12 +175,11 @@ inline constexpr int kRadarAzimuths = 72;
 double radar_wavelength(double ghz);
 
 /// Cross-sections around the horizon, m², of a mesh in millimetres, at the frequency and
-/// polarization of the options. @throw InputError naming --radar; Interrupted.
+/// polarization of the options. @throw Interrupted
 std::vector<double> radar_sections(const SurfaceMesh& mesh, const ReflectOptions& options,
                                    const Executor& executor);
 
-/// Two meshes at the frequency and polarization of the options.
-/// @throw InputError naming --radar; Interrupted.
+/// Two meshes at the frequency and polarization of the options. @throw Interrupted
 RadarComparison compare_radar(const SurfaceMesh& before, const SurfaceMesh& after,
                               const ReflectOptions& options, const Executor& executor);
 
@@ -162,7 +189,11 @@ const char* polarization_word(Polarization polarization);
 /// The mean of cross-sections in dBsm, 10 log₁₀ of their mean.
 double mean_dbsm(const std::vector<double>& sections);
 
-/// {"ghz", "polarization", "mean_dbsm_before", "mean_dbsm_after"}
+/// The cross-section in dBsm that a tenth of them exceeds.
+double p90_dbsm(std::vector<double> sections);
+
+/// {"ghz", "polarization", "mean_dbsm_before", "mean_dbsm_after", "p90_dbsm_before",
+/// "p90_dbsm_after"}; "ghz" of several frequencies is their list.
 nlohmann::json radar_json(const RadarComparison& comparison);
 /// "azimuth_deg,before_dbsm,after_dbsm", a line per azimuth.
 std::string radar_csv(const RadarComparison& comparison);

@@ -26,6 +26,7 @@
 #include "design/reflect/light/reflection_energy.h"
 #include "design/reflect/mesh/faces.h"
 #include "design/reflect/radar.h"
+#include "design/reflect/radar_goal.h"
 #include "design/reflect/shape/normals.h"
 #include "design/reflect/shape/shape_update.h"
 
@@ -89,6 +90,7 @@ class Schedule {
         field_(frame_.to_unit(make_light_field(options))),
         keep_(constraint_set(input)) {
     state_.fingerprint = reflect_fingerprint(input, options);
+    if (options.goal == GoalKind::kRadar) sector_ = radar_sector(options, input.mesh);
     if (options.resume) resume();
   }
 
@@ -98,10 +100,7 @@ class Schedule {
       if (state_.updates.empty()) state_.before = evaluated();
       for (int stage = state_.stage; stage < stages(); ++stage) run_stage(stage);
       result.after = evaluated();
-      if (options_.radar_ghz > 0.0) {
-        result.radar = compare_radar(frame_.from_unit(reference_), frame_.from_unit(mesh_),
-                                     options_, executor_);
-      }
+      result.radar = radar_comparison();
       if (!options_.glare.empty()) {
         result.glare = std::make_shared<GlareComparison>(
             compare_glare(frame_.from_unit(reference_), frame_.from_unit(mesh_),
@@ -114,8 +113,7 @@ class Schedule {
     result.fingerprint = state_.fingerprint;
     result.before = state_.before;
     result.unmet = Constraints(reference_, keep_, Executor::serial()).broken(mesh_.vertices);
-    if (result.done() &&
-        !gained_enough(field_.goal.kind, result.before.total, result.after.total)) {
+    if (result.done() && !gained_enough(options_.goal, result.before.total, result.after.total)) {
       result.unmet.push_back(gain_words(result.before.total, result.after.total));
     }
     result.reference = frame_.from_unit(reference_);
@@ -142,10 +140,24 @@ class Schedule {
   }
 
   [[nodiscard]] Energies evaluated() const {
+    if (sector_) {
+      return radar_energies(frame_.from_unit(mesh_), *sector_, options_.polarization, executor_);
+    }
     return evaluate(mesh_, field_.goal, field_.evaluation_directions(), executor_);
   }
 
-  [[nodiscard]] int stages() const { return options_.split && options_.face_updates > 0 ? 3 : 2; }
+  [[nodiscard]] std::optional<RadarComparison> radar_comparison() const {
+    const SurfaceMesh before = frame_.from_unit(reference_);
+    const SurfaceMesh after = frame_.from_unit(mesh_);
+    if (sector_) return compare_radar(before, after, *sector_, options_.polarization, executor_);
+    if (options_.radar_ghz > 0.0) return compare_radar(before, after, options_, executor_);
+    return {};
+  }
+
+  [[nodiscard]] int stages() const {
+    if (sector_) return 1;
+    return options_.split && options_.face_updates > 0 ? 3 : 2;
+  }
 
   [[nodiscard]] Stage stage_of(int number) const {
     if (number == 0) return {"rim-spoke", ElementKind::kRimSpoke, options_.rim_updates};
@@ -195,6 +207,10 @@ class Schedule {
 
   void run_stage(int number) {
     begin_stage(number);
+    if (sector_) {
+      run_radar_stage();
+      return;
+    }
     UnmetTurns unmet(state_.unmet);
     const Stage stage = stage_of(number);
     if (stage.updates == 0) return;
@@ -226,6 +242,44 @@ class Schedule {
     }
   }
 
+  [[nodiscard]] RadarEchoes echoes_of(const SurfaceMesh& mesh) const {
+    return {frame_.from_unit(mesh), *sector_, options_.polarization, executor_};
+  }
+
+  void run_radar_stage() {
+    const SurfaceMesh reference = frame_.from_unit(reference_);
+    const RadarDescent descent(
+        reference, keep_.fixed,
+        {radar_wavelength(sector_->ghz.front()), options_.anchor, state_.before.total});
+    const Constraints constraints(reference_, keep_, executor_);
+    RadarEchoes echoes = echoes_of(mesh_);
+    while (number() < options_.radar_updates && !settled()) {
+      ReflectUpdate row;
+      row.stage = "radar";
+      row.energy = echoes.mean();
+      const Eigen::Matrix3Xd vertices = frame_.from_unit(mesh_).vertices;
+      const Eigen::Matrix3Xd step = descent.moved(vertices, echoes, executor_) - vertices;
+      if (!take_lower(frame_.to_unit(1.0) * step, constraints, echoes)) break;
+      record(row);
+    }
+  }
+
+  /// Moves the vertices by a step, or half or a quarter of it, so that the whole computation of
+  /// edges and bounces confirms the gain. @return false if none of the three does.
+  bool take_lower(const Eigen::Matrix3Xd& step, const Constraints& constraints,
+                  RadarEchoes& echoes) {
+    for (const double share : {1.0, 0.5, 0.25}) {
+      SurfaceMesh trial = mesh_;
+      trial.vertices = constraints.enforced(mesh_.vertices + share * step);
+      RadarEchoes looked = echoes_of(trial);
+      if (!(looked.mean() < echoes.mean())) continue;
+      mesh_ = std::move(trial);
+      echoes = std::move(looked);
+      return true;
+    }
+    return false;
+  }
+
   static bool is_near(const Eigen::Matrix3Xd& vertices) {
     return vertices.allFinite() && vertices.cwiseAbs().maxCoeff() < kFarthest;
   }
@@ -239,7 +293,7 @@ class Schedule {
 
   /// True if normals go a part of the way in each update, and farther where faces did not follow.
   [[nodiscard]] bool pursues() const {
-    return options_.method == Method::kExact && field_.goal.kind == GoalKind::kStealth;
+    return options_.method == Method::kExact && options_.goal == GoalKind::kStealth;
   }
 
   /// The anchor of one update: the positions held by β and by kStay, combined into one square.
@@ -259,10 +313,12 @@ class Schedule {
     state_.updates.push_back(row);
     const std::chrono::duration<double> unsaved = std::chrono::steady_clock::now() - saved_;
     if (saves_ == 0 || unsaved.count() >= kSaveSeconds) save();
-    control_.report(
-        {"reflect, " + row.stage, static_cast<double>(row.number),
-         static_cast<double>(options_.rim_updates + (stages() - 1) * options_.face_updates),
-         "energy " + number_text(row.energy, 4)});
+    const int most = sector_ ? options_.radar_updates
+                             : options_.rim_updates + (stages() - 1) * options_.face_updates;
+    control_.report({"reflect, " + row.stage, static_cast<double>(row.number),
+                     static_cast<double>(most),
+                     sector_ ? decimal_text(mean_dbsm({row.energy}), 1) + " dBsm"
+                             : "energy " + number_text(row.energy, 4)});
   }
 
   /// True if the stage no longer gains.
@@ -367,6 +423,7 @@ class Schedule {
   SurfaceMesh reference_;
   SurfaceMesh mesh_;
   LightField field_;
+  std::optional<RadarSector> sector_;  ///< Of --goal radar.
   ConstraintSet keep_;
   NormalAnchor anchor_;
   ReflectCheckpoint state_;  ///< Its vertices are in `mesh_` until it is saved.
@@ -379,6 +436,7 @@ class Schedule {
 }  // namespace
 
 bool gained_enough(GoalKind goal, double before, double after) {
+  if (goal == GoalKind::kRadar) return after <= (1.0 - kMinGain) * before;
   if (Goal{.kind = goal}.maximizes()) return after > 0.0 && after >= (1.0 + kMinGain) * before;
   return before <= kLittleEnergy ? after <= kLittleEnergy : after <= (1.0 - kMinGain) * before;
 }
@@ -392,6 +450,9 @@ ReflectResult reflect_shape(const ReflectInput& input, const ReflectOptions& opt
 Energies evaluate(const SurfaceMesh& mesh, const ReflectOptions& options,
                   const Executor& executor) {
   validate(options);
+  if (options.goal == GoalKind::kRadar) {
+    return radar_energies(mesh, radar_sector(options, mesh), options.polarization, executor);
+  }
   const UnitFrame frame(mesh);
   const LightField field = frame.to_unit(make_light_field(options));
   return evaluate(frame.to_unit(mesh), field.goal, field.evaluation_directions(), executor);

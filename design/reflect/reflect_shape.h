@@ -18,7 +18,7 @@ namespace lensforge::reflect {
 /// One update of the vertices.
 struct ReflectUpdate {
   int number = 0;
-  std::string stage;    ///< "rim-spoke", "face" or "split".
+  std::string stage;    ///< "rim-spoke", "face", "split" or "radar".
   double energy = 0.0;  ///< Energy of the shape before it, on the update's own directions.
   double mean_displacement = 0.0;  ///< Of all vertices after it, as a share of the diagonal.
   double max_displacement = 0.0;
@@ -27,11 +27,12 @@ struct ReflectUpdate {
 
 void describe(Description& d, ReflectUpdate& update);
 
-/// Cross-sections around the horizon of the original mesh and of the new shape, m²; the meshes are
-/// in millimetres.
+/// Cross-sections of the original mesh and of the new shape at azimuths on the horizon, m²,
+/// averaged over the frequencies; the meshes are in millimetres.
 struct RadarComparison {
-  double ghz = 0.0;
+  std::vector<double> ghz;
   Polarization polarization = Polarization::kVertical;
+  std::vector<double> azimuth_deg;
   std::vector<double> before;
   std::vector<double> after;
 };

@@ -22,6 +22,7 @@
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
+#include "core/text/read_numbers.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
 #include "design/reflect/glare.h"
@@ -188,19 +189,27 @@ struct GoalWords {
   std::string energy;
 };
 
+std::string energy_of(const std::string& light) {
+  return "Energy of the " + light + ", by the square of its radiance.";
+}
+
 GoalWords words_of(const ReflectOptions& options) {
   switch (options.goal) {
     case GoalKind::kPoint:
-      return {"Light to a point", "the light that goes to the point", "light at the point"};
+      return {"Light to a point", "the light that goes to the point",
+              energy_of("light at the point")};
     case GoalKind::kLine:
-      return {"Light to a line", "the light that goes to the line", "light at the line"};
+      return {"Light to a line", "the light that goes to the line", energy_of("light at the line")};
     case GoalKind::kDeflect:
       return {"Light away from a point", "the light that still goes to the point",
-              "light at the point"};
+              energy_of("light at the point")};
+    case GoalKind::kRadar:
+      return {"No echo for a radar", "what an eye beside a lamp sees",
+              "Mean radar cross-section over the sector, m²."};
     case GoalKind::kStealth:
       break;
   }
-  return {"No light back", "what an eye beside the lamp sees", "light that goes back"};
+  return {"No light back", "what an eye beside the lamp sees", energy_of("light that goes back")};
 }
 
 std::string badge(bool good, const std::string& text) {
@@ -255,8 +264,7 @@ std::string moved_table(const ReflectResult& result) {
 }
 
 std::string summary(const ReflectResult& result, const GoalWords& words) {
-  const std::string note = element(
-      "p", "class=\"soft\"", "Energy of the " + words.energy + ", by the square of its radiance.");
+  const std::string note = element("p", "class=\"soft\"", words.energy);
   return html_section("Energies", element("div", "class=\"columns\"",
                                           element("div", "", energy_table(result) + note) +
                                               element("div", "", moved_table(result))));
@@ -298,10 +306,14 @@ std::string energy_section(const ReflectResult& result) {
 
 std::string radar_section(const ReflectResult& result) {
   if (!result.radar) return "";
-  const std::string words = "Around the horizon at " + number_text(result.radar->ghz) + " GHz, " +
-                            polarization_word(result.radar->polarization) + ", on average " +
-                            decimal_text(mean_dbsm(result.radar->before), 1) + " dBsm before, " +
-                            decimal_text(mean_dbsm(result.radar->after), 1) + " dBsm after.";
+  const RadarComparison& radar = *result.radar;
+  const std::string words = "On the horizon at " + numbers_text(radar.ghz) + " GHz, " +
+                            polarization_word(radar.polarization) + ": on average " +
+                            decimal_text(mean_dbsm(radar.before), 1) + " dBsm before, " +
+                            decimal_text(mean_dbsm(radar.after), 1) +
+                            " dBsm after; a tenth of the azimuths exceeds " +
+                            decimal_text(p90_dbsm(radar.before), 1) + " and " +
+                            decimal_text(p90_dbsm(radar.after), 1) + " dBsm.";
   return html_section(
       "Radar cross-section",
       element("figure", "style=\"max-width:34rem\"",

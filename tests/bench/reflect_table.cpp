@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The reflector stage on the drawn shapes, as Markdown tables: descents at several numbers of
 // faces, both methods at equal displacement, the figures of Tojo et al., what silhouettes add to
-// gradients by normals, and the sunlight that façades reflect.
+// gradients by normals, the goal of a radar, and the sunlight that façades reflect.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include "bench/reflect_figures.h"
 #include "core/text/number_text.h"
 #include "design/reflect/mesh/faces.h"
+#include "design/reflect/radar_goal.h"
 #include "design/reflect/reflect_shape.h"
 #include "fixtures/shapes/shapes.h"
 
@@ -24,6 +25,7 @@ namespace lensforge::bench {
 namespace {
 
 using reflect::Method;
+using reflect::ReflectInput;
 using reflect::ReflectOptions;
 using reflect::ReflectResult;
 
@@ -164,6 +166,85 @@ class DescentTable {
                         "seconds"}};
 };
 
+/// Radar cross-sections at 10 GHz around the horizon by the whole computation, of the original
+/// shape, of that without light back and of that of the radar goal.
+class RadarTable {
+ public:
+  explicit RadarTable(const Settings& settings)
+      : settings_(settings), executor_(Executor::cpu(settings.threads)) {}
+
+  std::string text() {
+    for (const shapes::NamedShape& shape : shapes::drawn_shapes()) {
+      const bool usual = shape.name == "animal" || shape.name == "fish" || shape.name == "rocket";
+      if (settings_.shapes.empty() ? usual : is_wanted(settings_, shape)) add(shape);
+    }
+    return table_.text();
+  }
+
+ private:
+  /// Size of a shape's unit, mm: the shapes are then some 10 wavelengths long.
+  static constexpr double kUnit = 100.0;
+  /// Faces of every shape; fins and ears lose theirs with fewer.
+  static constexpr int kFaces = 2000;
+
+  static ReflectOptions options(reflect::GoalKind goal, const char* ghz) {
+    ReflectOptions options;
+    options.goal = goal;
+    options.faces = kFaces;
+    if (goal == reflect::GoalKind::kRadar) options.frequency = ghz;
+    return options;
+  }
+
+  void add(const shapes::NamedShape& shape) {
+    SurfaceMesh mesh = shape.draw();
+    mesh.vertices *= kUnit;
+    const ReflectOptions radar = options(reflect::GoalKind::kRadar, "10");
+    const ReflectInput input = prepared_input(mesh, shape.name, radar);
+    add_row(shape.name, "as drawn", {input.mesh, 0.0, 0});
+    for (const auto& [name, goal] : {std::pair("stealth", reflect::GoalKind::kStealth),
+                                     std::pair("radar", reflect::GoalKind::kRadar)}) {
+      const ReflectResult result = reflect_shape(
+          input, options(goal, "10"), executor_, RunControl({}, [](const Progress& p) {
+            std::fprintf(stderr, "%s %g %s\n", p.stage.c_str(), p.done, p.detail.c_str());
+          }));
+      add_row(shape.name, name,
+              {result.mesh, result.mean_displacement, static_cast<int>(result.updates.size())});
+    }
+  }
+
+  struct Shape {
+    const SurfaceMesh& mesh;
+    double displacement;
+    int updates;
+  };
+
+  void add_row(const std::string& name, const std::string& goal, const Shape& shape) {
+    std::vector<std::string> row{name, goal, decimals(100.0 * shape.displacement, 2),
+                                 std::to_string(shape.updates)};
+    for (const char* ghz : {"10", "9.5", "9"}) row.push_back(mean(shape.mesh, ghz, "", "vv"));
+    row.push_back(mean(shape.mesh, "10", "1,361,2", "vv"));
+    row.push_back(mean(shape.mesh, "10", "", "hh"));
+    table_.add(row);
+    std::fprintf(stderr, "%s, %s: %s %% %s %s %s %s %s dBsm\n", name.c_str(), goal.c_str(),
+                 row[2].c_str(), row[4].c_str(), row[5].c_str(), row[6].c_str(), row[7].c_str(),
+                 row[8].c_str());
+  }
+
+  [[nodiscard]] std::string mean(const SurfaceMesh& mesh, const char* ghz, const char* sector,
+                                 const std::string& polarization) const {
+    ReflectOptions o = options(reflect::GoalKind::kRadar, ghz);
+    o.sector = sector;
+    o.polarization = polarization == "hh" ? reflect::Polarization::kHorizontal
+                                          : reflect::Polarization::kVertical;
+    return decimals(reflect::mean_dbsm({evaluate(mesh, o, executor_).total}), 1);
+  }
+
+  const Settings& settings_;
+  Executor executor_;
+  MarkdownTable table_{{"shape", "goal", "mean displacement, %", "updates", "10 GHz", "9.5 GHz",
+                        "9 GHz", "10 GHz, azimuths between", "10 GHz, HH"}};
+};
+
 void print(const Settings& settings, const std::vector<std::string>& parts) {
   const Executor executor = Executor::cpu(settings.threads);
   for (const std::string& part : parts) {
@@ -176,6 +257,7 @@ void print(const Settings& settings, const std::vector<std::string>& parts) {
       std::puts(almond_table(settings.almond, executor).text().c_str());
     }
     if (part == "glare") std::puts(glare_table(executor).text().c_str());
+    if (part == "radar") std::puts(RadarTable(settings).text().c_str());
     if (part == "slopes") std::puts(slope_table(executor).text().c_str());
     std::fflush(stdout);
   }
@@ -187,14 +269,17 @@ void print(const Settings& settings, const std::vector<std::string>& parts) {
 int main(int argc, char** argv) try {
   using namespace lensforge::bench;
   Settings settings;
-  std::vector<std::string> parts{"descent", "methods", "figures", "slopes", "almond", "glare"};
+  std::vector<std::string> parts{"descent", "methods", "figures", "slopes",
+                                 "almond",  "radar",   "glare"};
   CLI::App app("Tables of the reflector stage on the drawn shapes.");
   app.add_option("--parts", parts,
                  "descent: every shape at several numbers of faces; methods: both at equal "
-                 "displacement; figures; slopes; almond; glare; all without it")
+                 "displacement; figures; slopes; almond; radar: both goals on three shapes of 10 "
+                 "wavelengths; glare; all without it")
       ->delimiter(',')
       ->check(CLI::IsMember(parts));
-  app.add_option("--shapes", settings.shapes, "of descent and methods, their names; all without it")
+  app.add_option("--shapes", settings.shapes,
+                 "of descent, methods and radar, their names; all without it")
       ->delimiter(',');
   app.add_option("--anchors", settings.anchors, "of the exact method, values of beta")
       ->delimiter(',');

@@ -199,6 +199,38 @@ TEST_F(Glare, BadPlacesAndSitesAreRefused) {
   expect_bad(with({"--place", "4,4,4"}), {"--place 4,4,4", "inside"});
 }
 
+TEST_F(Reflect, ARadarsGoalIsDescendedAndReported) {
+  // A sphere-like body of one wavelength.
+  const Arguments arguments = {"reflect",  path("shape.off"), "--faces",   "100",         "--goal",
+                               "radar",    "--out",           path("out"), "--frequency", "270,300",
+                               "--sector", "-60,60,10",       "--json"};
+  const Outcome outcome = run(arguments);
+  ASSERT_THAT(outcome.exit_code, ::testing::AnyOf(0, 3)) << outcome.err;
+  const nlohmann::json result = outcome.json();
+  EXPECT_EQ(result["goal"], "radar");
+  EXPECT_EQ(result["radar"]["ghz"], nlohmann::json({270, 300}));
+  EXPECT_LE(result["radar"]["mean_dbsm_after"], result["radar"]["mean_dbsm_before"]);
+  EXPECT_THAT(content(at("out/convergence.csv")), HasSubstr(",radar,"));
+  EXPECT_THAT(content(at("out/report.html")), HasSubstr("On the horizon at 270,300 GHz"));
+  EXPECT_THAT(content(at("out/radar.csv")), HasSubstr("\n-60.00,"));
+  EXPECT_THAT(content(at("out/radar.svg")), HasSubstr("<polyline"));
+}
+
+TEST_F(Reflect, ARadarsGoalNeedsAFrequencyAndASector) {
+  const auto refused = [&](Arguments more, const std::vector<std::string>& parts) {
+    more.insert(more.begin(), {"--goal", "radar"});
+    expect_refused(kOctahedron, more, parts);
+  };
+  refused({}, {"--frequency", "is missing"});
+  refused({"--frequency", "0"}, {"--frequency 0", "0.01 to 1000 GHz"});
+  refused({"--frequency", "12,8"}, {"--frequency 12,8", "ascending"});
+  refused({"--frequency", "10", "--sector", "90,90,2"}, {"--sector 90,90,2", "TO above FROM"});
+  refused({"--frequency", "10", "--sector", "90,0,2"}, {"--sector 90,0,2", "TO above FROM"});
+  refused({"--frequency", "10", "--radar", "10"}, {"--radar", "--goal radar"});
+  expect_refused(kOctahedron, {"--sector", "0,90,2"}, {"--sector 0,90,2", "is for --goal radar"});
+  expect_refused(kOctahedron, {"--frequency", "10"}, {"--frequency 10", "is for --goal radar"});
+}
+
 TEST_F(Reflect, FilesOfOthersAreKeptUnlessForced) {
   fs::create_directory(at("out"));
   write(at("out/surface.ply"), "mine");

@@ -110,7 +110,9 @@ Eigen::Matrix3Xd listed_lights(const std::string& text) {
 }
 
 Goal make_goal(const ReflectOptions& options) {
-  Goal goal{options.goal, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  // A radar's shape is drawn as the light of the stealth goal shows it.
+  const GoalKind kind = options.goal == GoalKind::kRadar ? GoalKind::kStealth : options.goal;
+  Goal goal{kind, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   if (!goal.has_place()) {
     if (options.place.empty()) return goal;
     throw InputError("--place " + options.place +

@@ -192,7 +192,8 @@ TEST(RadarCrossSection, LargeSphereIsItsShadow) {
 }
 
 TEST(RadarCrossSection, RefusesShapesOfTooManyWavelengths) {
-  EXPECT_THROW(RadarBody(shapes::icosphere(1), 1e-4), InputError);
+  EXPECT_THROW(require_radar_size(shapes::icosphere(1), 1e-4, "--radar"), InputError);
+  EXPECT_NO_THROW(require_radar_size(shapes::icosphere(1), 0.1, "--radar"));
 }
 
 }  // namespace
