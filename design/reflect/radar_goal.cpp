@@ -139,7 +139,7 @@ std::vector<double> frequencies(const std::string& text) {
     throw InputError("--frequency: is missing; --goal radar needs it, as --frequency 10");
   }
   const std::size_t count = split(text, ',').size();
-  const std::vector<double> ghz = parse_numbers(text, "--frequency", static_cast<int>(count));
+  std::vector<double> ghz = parse_numbers(text, "--frequency", static_cast<int>(count));
   const bool ascend = std::is_sorted(ghz.begin(), ghz.end(), std::less_equal<>());
   if (ghz.front() < kMinGhz || ghz.back() > kMaxGhz || !ascend || count > kMaxFrequencies) {
     throw InputError("--frequency " + text +

@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const StepHeader kHeader{"mesh", "a mesh", "", "lensforge", "2026-01-01T00:00:00"};
+const StepHeader kMeshHeader{"mesh", "a mesh", "", "lensforge", "2026-01-01T00:00:00"};
 
 /// A box with a corner at `low`, looking outwards.
 SurfaceMesh box(const Eigen::Vector3d& low, const Eigen::Vector3d& size) {
@@ -49,7 +49,7 @@ class MeshStep : public ::testing::Test {
 };
 
 TEST_F(MeshStep, AClosedPieceIsASolidWithItsVolume) {
-  write_mesh_step(box({1, 2, 3}, {2, 3, 4}), kHeader, path_);
+  write_mesh_step(box({1, 2, 3}, {2, 3, 4}), kMeshHeader, path_);
   const SolidContent read = inspect_step(path_);
   EXPECT_TRUE(read.is_one_solid());
   EXPECT_EQ(12, read.faces);
@@ -59,8 +59,8 @@ TEST_F(MeshStep, AClosedPieceIsASolidWithItsVolume) {
 }
 
 TEST_F(MeshStep, PiecesAreSolidsOfTheirOwn) {
-  const SolidContent written =
-      write_mesh_step(both(box({0, 0, 0}, {1, 1, 1}), box({5, 0, 0}, {2, 2, 2})), kHeader, path_);
+  const SolidContent written = write_mesh_step(
+      both(box({0, 0, 0}, {1, 1, 1}), box({5, 0, 0}, {2, 2, 2})), kMeshHeader, path_);
   EXPECT_EQ(2, written.solids);
   EXPECT_EQ(24, written.faces);
   EXPECT_TRUE(written.closed);
@@ -71,7 +71,7 @@ TEST_F(MeshStep, AnOpenPieceIsAShell) {
   SurfaceMesh open = box({0, 0, 0}, {1, 1, 1});
   open.triangles.conservativeResize(3, 10);
   const SolidContent written =
-      write_mesh_step(both(open, box({5, 0, 0}, {2, 2, 2})), kHeader, path_);
+      write_mesh_step(both(open, box({5, 0, 0}, {2, 2, 2})), kMeshHeader, path_);
   EXPECT_EQ(1, written.solids);
   EXPECT_EQ(22, written.faces);
   EXPECT_TRUE(written.valid);
@@ -81,7 +81,7 @@ TEST_F(MeshStep, AnOpenPieceIsAShell) {
 TEST_F(MeshStep, SidesWithoutLengthAreRefusedAndLeaveNothing) {
   SurfaceMesh thin = box({0, 0, 0}, {1, 1, 1e-9});
   try {
-    write_mesh_step(thin, kHeader, path_);
+    write_mesh_step(thin, kMeshHeader, path_);
     FAIL() << "written";
   } catch (const RunError& error) {
     EXPECT_THAT(error.what(), HasSubstr("mesh.step: cannot be written"));
