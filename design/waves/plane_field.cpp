@@ -400,7 +400,7 @@ PlaneField::Vertex laid_ray(const FieldPlan& plan, const PlaneField::Vertex& ray
 
 namespace {
 
-/// Floor of a number that an int holds; std::floor() is a call on processors of 2003.
+/// Floor of a number that an int holds; std::floor() is a call in code for every x86-64.
 int floor_of(double x) {
   const int whole = static_cast<int>(x);
   return x < whole ? whole - 1 : whole;
