@@ -170,14 +170,24 @@ SectorRange sector_range(const std::string& text) {
 
 /// What is of light, and no use to a radar.
 void require_no_light(const ReflectOptions& options) {
-  for (const auto& [given, option] : {std::pair(!options.light.empty(), "--light"),
-                                      std::pair(options.method != Method::kExact, "--method paper"),
-                                      std::pair(options.denoise > 0.0, "--denoise"),
-                                      std::pair(options.radar_ghz > 0.0, "--radar")}) {
+  const ReflectOptions usual;
+  for (const auto& [given, option] :
+       {std::pair(!options.light.empty(), "--light"),
+        std::pair(options.method != Method::kExact, "--method paper"),
+        std::pair(options.denoise > 0.0, "--denoise"),
+        std::pair(options.radar_ghz > 0.0, "--radar"),
+        std::pair(options.elevation_deg != usual.elevation_deg, "--elevation"),
+        std::pair(options.direction_rows != usual.direction_rows, "--direction-rows"),
+        std::pair(options.sun_positions != usual.sun_positions, "--sun-positions"),
+        std::pair(options.normal_weight != usual.normal_weight, "--normal-weight"),
+        std::pair(options.rim_updates != usual.rim_updates, "--rim-updates"),
+        std::pair(options.face_updates != usual.face_updates, "--face-updates"),
+        std::pair(options.normal_steps != usual.normal_steps, "--normal-steps"),
+        std::pair(!options.split, "--no-split")}) {
     if (!given) continue;
     throw InputError(std::string(option) +
-                     ": does not go with --goal radar, which has --frequency and --sector; leave "
-                     "it out");
+                     ": does not go with --goal radar, which has --frequency, --sector and "
+                     "--radar-updates; leave it out");
   }
 }
 
@@ -195,6 +205,10 @@ void require_radar_goal(const ReflectOptions& options) {
     if (text.empty()) continue;
     throw InputError(option + text + ": is for --goal radar; --radar GHZ evaluates other goals");
   }
+  if (options.radar_updates == ReflectOptions{}.radar_updates) return;
+  throw InputError(
+      "--radar-updates: is for --goal radar; other goals have --rim-updates and "
+      "--face-updates");
 }
 
 RadarSector radar_sector(const ReflectOptions& options, const SurfaceMesh& mesh) {

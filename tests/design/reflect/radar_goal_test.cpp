@@ -173,6 +173,12 @@ TEST(RadarGoal, BadOptionsAreRefused) {
   refused([](ReflectOptions& o) { o.place = "0,0,1"; });
   refused([](ReflectOptions& o) { o.method = Method::kPaper; });
   refused([](ReflectOptions& o) { o.denoise = 250.0; });
+  refused([](ReflectOptions& o) { o.elevation_deg = 10.0; });
+  refused([](ReflectOptions& o) { o.rim_updates = 5; });
+  refused([](ReflectOptions& o) { o.split = false; });
+  ReflectOptions light;
+  light.radar_updates = 5;
+  EXPECT_THROW(validate(light), InputError);
 }
 
 }  // namespace
