@@ -254,6 +254,9 @@ CommandResult run(CommandFrame& frame, ReflectSettings& settings) {
   if (!settings.evaluate && settings.out.empty()) {
     throw InputError("--out: is missing; --out DIR writes a new shape, --evaluate only energies");
   }
+  if (settings.evaluate && settings.step) {
+    throw InputError("--step: --evaluate writes nothing; leave one of them out");
+  }
   return settings.evaluate ? evaluate(frame, settings) : shape(frame, settings);
 }
 

@@ -384,10 +384,14 @@ GlareYear yearly_glare(const SurfaceMesh& mesh, const GlareSetup& setup, const E
   year.place_maximum.resize(setup.places.cols());
   Eigen::ArrayXd largest = Eigen::ArrayXd::Zero(kSunSteps);
   Eigen::ArrayXd irradiance(kSunSteps);
+  std::vector<SunStep> suns(index_of(kSunSteps));
+  parallel_for(
+      executor, "sun", kSunSteps, [&](std::int64_t i) { suns[index_of(i)] = sun_step(setup, i); },
+      64);
   for (Eigen::Index p = 0; p < setup.places.cols(); ++p) {
     const MirrorView view(unit, scene, frame.to_unit(setup.places.col(p)));
     const auto shine = [&](std::int64_t i) {
-      const SunStep sun = sun_step(setup, i);
+      const SunStep& sun = suns[index_of(i)];
       irradiance[i] =
           sun.beam > 0.0 ? sun.beam * view.gain(sun.towards, sun.radius, setup.material) : 0.0;
     };

@@ -44,8 +44,8 @@ bool holds_result(const std::filesystem::path& folder, std::uint64_t fingerprint
 /// A result in the format of reflect.json: energies before and after, displacements, options.
 nlohmann::json result_json(const ReflectResult& result, const ReflectOptions& options);
 
-/// Writes all files of a result but kSolid and renames them together. @return their paths.
-/// @throw RunError
+/// Writes all files of a result but kSolid and renames them together; those that an earlier run had
+/// besides are removed. @return their paths. @throw RunError
 std::vector<std::filesystem::path> write_result(const ReflectResult& result,
                                                 const ReflectOptions& options,
                                                 const std::filesystem::path& folder,

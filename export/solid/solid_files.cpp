@@ -33,6 +33,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <gp_Pln.hxx>
 #include <map>
 #include <numeric>
@@ -42,6 +43,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/mesh/surface_mesh.h"
@@ -264,6 +266,25 @@ void fill_header(const StepHeader& header, STEPControl_Writer& writer) {
   section.SetTimeStamp(occ_text(header.time_stamp));
 }
 
+/// Writes a shape as STEP and reads it back. @pre set_up_writing()
+/// @param finish  what is left to say of it once it is converted.
+TopoDS_Shape through_step(const TopoDS_Shape& made, STEPControl_StepModelType kind,
+                          const std::function<void(STEPControl_Writer&)>& finish,
+                          const fs::path& beside, const fs::path& path, const RunControl& control) {
+  STEPControl_Writer writer;
+  solid_step("converting", control);
+  if (writer.Transfer(made, kind) != IFSelect_RetDone) {
+    fail_to_write(path, "OpenCASCADE cannot put the shape into STEP");
+  }
+  finish(writer);
+  solid_step("writing lines", control);
+  errno = 0;
+  if (writer.Write(beside.c_str()) != IFSelect_RetDone) fail_to_write(path, last_system_error());
+  TopoDS_Shape read = read_step_shape(beside, solid_step("reading back", control));
+  solid_step("checking", control);
+  return read;
+}
+
 /// Body of the child process.
 SolidContent write_beside(const SplineNet& net, const StepHeader& header, StepSchema schema,
                           const fs::path& beside, const fs::path& path, const RunControl& control) {
@@ -271,19 +292,13 @@ SolidContent write_beside(const SplineNet& net, const StepHeader& header, StepSc
   solid_step("making the solid", control);
   const NamedSolid solid = make_spline_solid(net);
   set_up_writing(header, schema, net.outline.has_value());
-  STEPControl_Writer writer;
-  solid_step("converting", control);
-  if (writer.Transfer(solid.solid, STEPControl_ManifoldSolidBrep) != IFSelect_RetDone) {
-    fail_to_write(path, "OpenCASCADE cannot put the solid into STEP");
-  }
-  name_faces(solid, writer);
-  fill_header(header, writer);
-  solid_step("writing lines", control);
-  errno = 0;
-  if (writer.Write(beside.c_str()) != IFSelect_RetDone) fail_to_write(path, last_system_error());
-  const TopoDS_Shape shape = read_step_shape(beside, solid_step("reading back", control));
-  solid_step("checking", control);
-  return inspect_shape(shape, net.volume());
+  const auto finish = [&](STEPControl_Writer& writer) {
+    name_faces(solid, writer);
+    fill_header(header, writer);
+  };
+  const TopoDS_Shape read =
+      through_step(solid.solid, STEPControl_ManifoldSolidBrep, finish, beside, path, control);
+  return inspect_shape(read, net.volume());
 }
 
 }  // namespace
@@ -357,8 +372,6 @@ class MeshShape {
     int faces = 0;
   };
 
-  static std::size_t index_of(std::int64_t i) { return static_cast<std::size_t>(i); }
-
   /// A vertex of the piece that a vertex belongs to, the same for all of it.
   [[nodiscard]] int piece(int vertex) {
     int& of = piece_of_[index_of(vertex)];
@@ -412,17 +425,8 @@ SolidContent write_mesh_beside(const SurfaceMesh& mesh, const StepHeader& header
   MeshShape faces(mesh);
   const TopoDS_Shape made = faces.shape();
   set_up_writing(header, StepSchema::kAp214, false);
-  STEPControl_Writer writer;
-  solid_step("converting", control);
-  if (writer.Transfer(made, STEPControl_AsIs) != IFSelect_RetDone) {
-    fail_to_write(path, "OpenCASCADE cannot put the mesh into STEP");
-  }
-  fill_header(header, writer);
-  solid_step("writing lines", control);
-  errno = 0;
-  if (writer.Write(beside.c_str()) != IFSelect_RetDone) fail_to_write(path, last_system_error());
-  const TopoDS_Shape read = read_step_shape(beside, solid_step("reading back", control));
-  solid_step("checking", control);
+  const auto finish = [&](STEPControl_Writer& writer) { fill_header(header, writer); };
+  const TopoDS_Shape read = through_step(made, STEPControl_AsIs, finish, beside, path, control);
   SolidContent content = inspect_shape(read, faces.volume());
   if (content.faces != mesh.triangle_count() || !content.valid) {
     fail_to_write(path, "it does not read back as the mesh's faces");

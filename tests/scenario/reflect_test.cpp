@@ -199,6 +199,16 @@ TEST_F(Glare, BadPlacesAndSitesAreRefused) {
   expect_bad(with({"--place", "4,4,4"}), {"--place 4,4,4", "inside"});
 }
 
+TEST_F(Reflect, TheSolidIsOfThisShape) {
+  EXPECT_EQ(run(quick({"--step"})).exit_code, 0);
+  const Outcome read = run({"info", path("out/surface.step"), "--json"});
+  ASSERT_EQ(read.exit_code, 0) << read.err;
+  EXPECT_EQ(run(quick()).exit_code, 0);
+  EXPECT_FALSE(fs::exists(at("out/surface.step"))) << "of the shape before";
+  expect_refusal(run({"reflect", path("shape.off"), "--evaluate", "--step"}), 2,
+                 {"--step", "--evaluate"});
+}
+
 TEST_F(Reflect, ARadarsGoalIsDescendedAndReported) {
   // A sphere-like body of one wavelength.
   const Arguments arguments = {"reflect",  path("shape.off"), "--faces",   "100",         "--goal",
