@@ -446,7 +446,7 @@ std::vector<fs::path> write_result(const ReflectResult& result, const ReflectOpt
   }
   files.add(reflect_file::kConvergence, convergence_text(result));
   files.add(reflect_file::kJson, result_json(result, options).dump(2) + "\n");
-  const std::vector<fs::path> paths = files.publish();
+  std::vector<fs::path> paths = files.publish();
   // A table, a map or a solid of an earlier run is not of this shape.
   for (const char* name : reflect_file::kAll) {
     std::error_code ignored;
