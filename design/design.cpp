@@ -231,6 +231,11 @@ constexpr double kIterationSeconds = 5.1e-7;
 constexpr double kSplineSeconds = 2.5e-7;
 constexpr double kMadeSeconds = 1e-6;
 constexpr double kTransportSeconds = 6e-5;
+/// Of a picture in the light of one of a lamp's points, per triangle.
+constexpr double kLampSeconds = 1.7e-7;
+/// Relative cost of a smooth mesh's iteration in a lamp's light, which is blurred on parts of
+/// pixels.
+constexpr double kBlurred = 2.0;
 
 /// Bytes per triangle: transport, optimisation of a mesh (512²: 1.12 GB) and of a spline (128²:
 /// 0.57 GB), and files: surface and checkpoint, each twice while it is replaced.
@@ -268,7 +273,9 @@ constexpr double kWaveMemory = 2.5e9;
 double iteration_seconds(const Level& level, const DesignOptions& options) {
   const std::size_t colors = std::max<std::size_t>(1, options.light.spectrum.wavelengths.size());
   const double growth = 1.0 + kColorShare * (static_cast<double>(colors) - 1.0);
-  if (!level.spline) return growth * kIterationSeconds;
+  if (!level.spline) {
+    return growth * (source_extent(options.light).none() ? 1.0 : kBlurred) * kIterationSeconds;
+  }
   return growth * (options.made_by ? kMadeSeconds : kSplineSeconds);
 }
 
@@ -284,6 +291,17 @@ double usual_share(const DesignOptions& options, const Eigen::Vector2i& pixels) 
   return std::min(1.0, 100.0 / options.iterations * share);
 }
 
+/// Processor seconds of the pictures in the light of a lamp with a width, point by point: one a
+/// round of the level, and at the end those of all models and one of half the points.
+double lamp_seconds(const Level& level, bool last, double triangles, const DesignOptions& options) {
+  const OpticalSetup setup = optical_setup(options, level.pixels);
+  if (setup.extent.none()) return 0.0;
+  double pictures = level.rounds;
+  // A spline's last pictures have twice as many nodes each way.
+  if (last) pictures += level.spline ? 4.0 * 1.5 : 2.5;
+  return kLampSeconds * source_point_count(setup, options.thickness) * triangles * pictures;
+}
+
 /// Sites of a level's transports: those of the even mesh, for facets also their own.
 double transport_sites(double triangles, const DesignOptions& options) {
   const double even = std::min(triangles, kMaxEvenFaces);
@@ -296,7 +314,9 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
                              double share) {
   WorkEstimate estimate;
   double processor = 0.0;
-  for (const Level& level : plan_levels(working_size(columns, rows, options.pixels), options)) {
+  const std::vector<Level> levels =
+      plan_levels(working_size(columns, rows, options.pixels), options);
+  for (const Level& level : levels) {
     const double per_cell = level.spline ? 2.0 * kMeshSamples * kMeshSamples : 2.0;
     const double triangles = per_cell * (level.grid.columns - 1.0) * (level.grid.rows - 1.0);
     const double pixels = level.pixels.cast<double>().prod();
@@ -307,6 +327,7 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
       processor += triangles * iteration_seconds(level, options) *
                    usual_share(options, level.pixels) * iterations;
     }
+    processor += lamp_seconds(level, &level == &levels.back(), triangles, options);
     if (level.waves) {
       const OpticalSetup setup = optical_setup(options, level.pixels);
       const double once = wave_seconds(setup, wave_options(options, setup).wavelength);

@@ -153,10 +153,7 @@ std::vector<double> flux_of_lens(const Lens& lens, const OpticalSetup& setup,
   if (lens.model != SurfaceModel::kSpline) {
     return flux_of_surface(lens.surface, setup, lens.model, executor);
   }
-  const auto picture = [&](const OpticalSetup& point) {
-    return render_spline(*lens.spline, point, executor);
-  };
-  return picture_under(setup, points_for(lens.surface, setup), picture, control);
+  return flux_under_source(lens, setup, points_for(lens.surface, setup), executor, control);
 }
 
 ImageMetrics evaluate(const Lens& lens, SurfaceModel model, Image* rendered,

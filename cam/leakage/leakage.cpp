@@ -148,17 +148,34 @@ ChainPictures pictures_by_rays(const LeakageChain& chain, const FieldRenderSetup
   return pictures;
 }
 
+/// Surfaces with grids of their own have no rows, which scatter light.
 ChainPictures pictures_by_waves(const LeakageChain& chain, const FieldRenderSetup& setup,
                                 const WaveOptions& options, const Executor& executor,
                                 const RunControl& control) {
-  const std::vector<const SurfaceField*> fields = fields_of(chain);
   const Eigen::Vector2i& pixels = setup.optics.pixels;
-  std::vector<std::vector<double>> flux =
-      wave_flux(setup.optics, setup.grid, fields, options, executor, control);
   ChainPictures pictures;
-  for (std::size_t f = 0; f < fields.size(); ++f) {
-    pictures[fields[f]] = {pixels.x(), pixels.y(), std::move(flux[f])};
+  const auto render = [&](const std::vector<const SurfaceField*>& fields, const GridWindow& grid,
+                          const WaveOptions& waves) {
+    if (fields.empty()) return;
+    std::vector<std::vector<double>> flux =
+        wave_flux(setup.optics, grid, fields, waves, executor, control);
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      pictures[fields[f]] = {pixels.x(), pixels.y(), std::move(flux[f])};
+    }
+  };
+  std::vector<NamedSurface> surfaces = chain.steps;
+  surfaces.push_back(chain.designed);
+  std::vector<const SurfaceField*> rowed;
+  std::vector<const SurfaceField*> even;
+  GridWindow coarse;
+  for (const NamedSurface& surface : surfaces) {
+    add_once(surface, surface.grid ? even : rowed);
+    if (surface.grid) coarse = *surface.grid;
   }
+  WaveOptions unscattered = options;
+  unscattered.scatter.setZero();
+  render(even, coarse, unscattered);
+  render(rowed, setup.grid, options);
   return pictures;
 }
 

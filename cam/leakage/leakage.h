@@ -113,7 +113,7 @@ struct RenderedSurface;
 /// What a chain's pictures by waves need besides its setup.
 struct ChainWaves {
   double wavelength = 0.0;                ///< mm; of a setup without a spectrum; 0: by rays.
-  double scatter = 0.0;                   ///< WaveOptions::scatter
+  Eigen::Vector2d scatter{0.0, 0.0};      ///< WaveOptions::scatter
   const RenderedSurface* rays = nullptr;  ///< The designed surface by rays.
 
   /// Nothing if the light goes as rays.

@@ -136,12 +136,16 @@ LeakageChain PartSurfaces::chain() const {
   return chain;
 }
 
-LeakageChain PartSurfaces::short_chain() const {
+LeakageChain PartSurfaces::short_chain(const GridWindow& even) const {
   LeakageChain chain = this->chain();
+  chain.designed.grid = even;
   const auto chord =
       std::find_if(chain.steps.begin(), chain.steps.end(),
                    [](const NamedSurface& step) { return step.name == leak_cause::kChord; });
   chain.steps.erase(chord, chain.steps.end());
+  for (NamedSurface& step : chain.steps) {
+    if (step.name != leak_cause::kScallop) step.grid = even;
+  }
   chain.steps.push_back({leak_cause::kPath, &part()});
   return chain;
 }

@@ -59,7 +59,8 @@ class PartSurfaces {
 
   [[nodiscard]] LeakageChain chain() const;
   /// The same with the path's causes in one, for waves, whose pictures take longer.
-  [[nodiscard]] LeakageChain short_chain() const;
+  /// @param even  grid of the surfaces that have no rows.
+  [[nodiscard]] LeakageChain short_chain(const GridWindow& even) const;
   [[nodiscard]] const SurfaceField& designed() const { return design_.surface; }
   [[nodiscard]] const SurfaceField& rounded() const { return *raw_[1]; }
   [[nodiscard]] const SurfaceField& milled() const { return *raw_.back(); }

@@ -50,8 +50,11 @@ constexpr double kMicrometres = 1e3;
 /// much farther.
 constexpr double kOrderWidth = 1.2;
 
-double order_angle(double wavelength, const Passes& passes) {
-  return kOrderWidth * wavelength / passes.pitch;
+/// Along x and y.
+Eigen::Vector2d order_angles(double wavelength, const Passes& passes) {
+  Eigen::Vector2d angles = Eigen::Vector2d::Constant(kOrderWidth * wavelength / passes.pitch);
+  if (!passes.cross) angles[passes.axis] = 0.0;
+  return angles;
 }
 
 /// nm, for the light that a roughness which is not stated might scatter.
@@ -180,9 +183,10 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
   result.blurs = part_blurs(lens.setup, options, passes, setup.surface_height, wavelength);
   LeakageChain places_chain = chain;
   if (light.waves) {
-    LeakageChain by_waves = surfaces.short_chain();
+    LeakageChain by_waves =
+        surfaces.short_chain(lens_grid(lens.setup.lens_size, spacings.maxCoeff()));
     by_waves.haze = &result.haze;
-    result.light = {wavelength, order_angle(wavelength, passes)};
+    result.light = {wavelength, order_angles(wavelength, passes)};
     by_waves.waves = {result.light.wavelength, result.light.scatter, &result.leakage.designed};
     result.waves = measure_waves(by_waves, lens.target, setup, options.leakage, executor, control);
     places_chain = by_waves;
@@ -400,7 +404,7 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
   const double polished =
       polish_reach(polish) * polish.sigma + (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
   std::optional<WaveOptions> waves = site_.waves.options();
-  if (waves) waves->scatter = std::max(waves->scatter, order_angle(waves->wavelength, passes));
+  if (waves) waves->scatter = waves->scatter.cwiseMax(order_angles(waves->wavelength, passes));
   const double height = site_.setup.lens->surface.vertices.row(2).mean();
   const double seen = polished + (waves ? 0.5 * ramp_width(optics, height, *waves) : 0.0);
   const double beyond = (mould ? mould->scale : 1.0) * seen + passes_.front().tool.diameter;

@@ -17,6 +17,7 @@
 #include "design/flux/flux_image.h"
 #include "design/optimize/lbfgs.h"
 #include "design/render.h"
+#include "design/render/render_flux.h"
 
 namespace lensforge {
 namespace {
@@ -31,14 +32,6 @@ constexpr int kMaxPoints = 256;
 constexpr double kSmallImage = 0.5;
 
 double surface_height(const Lens& lens) { return lens.surface.vertices.row(2).mean(); }
-
-/// Picture of a lens in the light of one point, in the target's units.
-std::vector<double> point_picture(const Lens& lens, const OpticalSetup& setup,
-                                  const Executor& executor) {
-  std::vector<double> picture = flux_of_lens(lens, setup, executor);
-  for (double& value : picture) value *= lens.target.total();
-  return picture;
-}
 
 }  // namespace
 
@@ -66,6 +59,16 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count, const Po
   return sum;
 }
 
+std::vector<double> picture_under_few_rays(const OpticalSetup& setup, double z, int count,
+                                           const PointPicture& few, const PointPicture& many,
+                                           const Executor& executor, const RunControl& control) {
+  std::vector<double> sum = picture_under(setup, count, few, control);
+  const std::vector<double> coarse = picture_by_convolution(setup, z, few, executor);
+  const std::vector<double> fine = picture_by_convolution(setup, z, many, executor);
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += fine[i] - coarse[i];
+  return sum;
+}
+
 std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
                                            const PointPicture& picture, const Executor& executor) {
   SourceBlurOn<Executor> blur(source_kernel(setup, z), setup.pixels.x(), setup.pixels.y(),
@@ -88,20 +91,43 @@ Image corrected(const Image& target, const std::vector<double>& exact,
   return aim;
 }
 
+std::vector<double> flux_under_source(const Lens& lens, const OpticalSetup& setup, int count,
+                                      const Executor& executor, const RunControl& control) {
+  if (lens.model != SurfaceModel::kSpline) {
+    const auto picture = [&](const OpticalSetup& point) {
+      return flux_of_surface(lens.surface, point, lens.model, executor);
+    };
+    return picture_under(setup, count, picture, control);
+  }
+  const auto picture = [&](int samples) {
+    return [&, samples](const OpticalSetup& point) {
+      return render_spline(*lens.spline, samples, point, executor);
+    };
+  };
+  const int samples = picture_samples(*lens.spline);
+  if (setup.extent.none() || samples <= kMeshSamples) {
+    return picture_under(setup, count, picture(samples), control);
+  }
+  return picture_under_few_rays(setup, surface_height(lens), count,
+                                picture(std::max(kMeshSamples, samples / 2)), picture(samples),
+                                executor, control);
+}
+
 SourceCheck check_source(const Lens& lens, const Executor& executor, const RunControl& control) {
   const double z = surface_height(lens);
   const auto point = [&](const OpticalSetup& setup) {
-    return point_picture(lens, setup, executor);
+    return flux_of_lens(lens, setup, executor, control);
   };
   SourceCheck check;
   check.blur = source_blur(lens.setup, z);
   const int count = source_point_count(lens.setup, z);
   check.points = static_cast<int>(source_points(lens.setup.extent, count).size());
-  const auto difference = [&](const std::vector<double>& other) {
+  const auto difference = [&](std::vector<double> other) {
+    for (double& value : other) value *= lens.target.total();
     const Eigen::Vector2i& pixels = lens.setup.pixels;
     return compare(image_of(other, pixels.x(), pixels.y()), lens.render).mae;
   };
-  check.halving = difference(picture_under(lens.setup, count / 2, point, control));
+  check.halving = difference(flux_under_source(lens, lens.setup, count / 2, executor, control));
   check.convolution = difference(picture_by_convolution(lens.setup, z, point, executor));
   return check;
 }

@@ -39,11 +39,22 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count, const Po
 std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
                                            const PointPicture& picture, const Executor& executor);
 
+/// picture_under() with few rays from every point, and by convolution what more rays change.
+/// @param few, many  the point's picture by few and by many rays. @param z  of the surface, mm.
+std::vector<double> picture_under_few_rays(const OpticalSetup& setup, double z, int count,
+                                           const PointPicture& few, const PointPicture& many,
+                                           const Executor& executor,
+                                           const RunControl& control = {});
+
 /// Picture to optimise for, so that the exact picture becomes `target`: the target minus the
 /// current error of the optimiser's own approximation, at least 0.
 /// @param exact, seen  shares of the light in every pixel of the target, exact and as approximated.
 Image corrected(const Image& target, const std::vector<double>& exact,
                 const std::vector<double>& seen);
+
+/// flux_of_lens() under about `count` of the source's points.
+std::vector<double> flux_under_source(const Lens& lens, const OpticalSetup& setup, int count,
+                                      const Executor& executor, const RunControl& control = {});
 
 /// @pre the lens's source has an extent.
 SourceCheck check_source(const Lens& lens, const Executor& executor,

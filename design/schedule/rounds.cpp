@@ -445,17 +445,13 @@ Image corrected_target(const DesignTask& task, const DesignLog& log, const Level
                      picture_under(problem.setup, 1, seen));
   }
   const double z = mesh.vertices.row(2).mean();
-  const auto blurred = [&](const PointPicture& of) {
-    return picture_by_convolution(problem.setup, z, of, task.executor);
-  };
-  const std::vector<double> convolved = blurred(seen);
-  std::vector<double> exact =
-      picture_under(problem.setup, source_point_count(problem.setup, z), seen);
-  if (level.spline) {
-    // More rays from every point of the source would take minutes; the blur hides little of them.
-    const std::vector<double> fine = blurred(picture(kCorrectionSamples));
-    for (std::size_t i = 0; i < exact.size(); ++i) exact[i] += fine[i] - convolved[i];
-  }
+  const std::vector<double> convolved =
+      picture_by_convolution(problem.setup, z, seen, task.executor);
+  const int points = source_point_count(problem.setup, z);
+  const std::vector<double> exact =
+      level.spline ? picture_under_few_rays(problem.setup, z, points, seen,
+                                            picture(kCorrectionSamples), task.executor)
+                   : picture_under(problem.setup, points, seen);
   return corrected(target, exact, convolved);
 }
 

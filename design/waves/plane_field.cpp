@@ -62,13 +62,15 @@ class LineTransform {
 /// Columns that are transformed at once: two lines of the cache hold a value of each.
 constexpr int kColumns = 16;
 
+/// Adding and subtracting it rounds numbers below 2^51 to whole ones; std::round() is a call in
+/// code for every x86-64.
+constexpr double kRounds = 6755399441055744.0;
+
 /// e^{2πi t} of many t at once; most of the work of laying and propagating fields.
 class UnitPhases {
  public:
   void find(const std::vector<double>& turns) {
     const Eigen::Map<const Eigen::ArrayXd> t(turns.data(), static_cast<Eigen::Index>(turns.size()));
-    // Adding it rounds to whole numbers.
-    constexpr double kRounds = 6755399441055744.0;
     const Eigen::ArrayXf angle = (kTwoPi * (t - ((t + kRounds) - kRounds))).cast<float>();
     cosine_ = angle.cos();
     sine_ = angle.sin();
@@ -88,36 +90,25 @@ constexpr std::size_t kPending = 2048;
 /// Vertices are moved to this part of a step, so that sides are found without rounding.
 constexpr double kParts = 1024.0;
 
-/// A linear function of a place.
-struct Plane {
-  double a = 0.0, b = 0.0, c = 0.0;
-
-  [[nodiscard]] double at(double x, double y) const { return a * x + b * y + c; }
-};
-
 /// A triangle of rays on the nodes of a field. Places are in steps from the first node, vertices'
 /// and those tested for being inside whole parts of one: sides are then exact.
 class LaidTriangle {
  public:
-  LaidTriangle(const FieldPlan& plan, const std::array<PlaneField::Vertex, 3>& vertices) {
-    std::array<Eigen::Vector2d, 3> at;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Eigen::Vector2d steps =
-          (vertices[k].place - plan.centre).cwiseQuotient(plan.step) + plan.middle();
-      at[k] = (kParts * steps).array().round().matrix() / kParts;
-      box_.extend(at[k]);
-    }
-    doubled_ = cross(at[1] - at[0], at[2] - at[0]);
+  using Corner = PlaneField::Corner;
+  using Linear = PlaneField::Linear;
+
+  explicit LaidTriangle(const std::array<Corner, 3>& corners) : corners_(&corners) {
+    for (const Corner& corner : corners) box_.extend(corner.at);
+    doubled_ = cross(corners[1].at - corners[0].at, corners[2].at - corners[0].at);
     if (doubled_ == 0.0) return;
     const double turn = doubled_ < 0.0 ? -1.0 : 1.0;
     for (std::size_t k = 0; k < 3; ++k) {
-      const Eigen::Vector2d& from = at[(k + 1) % 3];
-      const Eigen::Vector2d& to = at[(k + 2) % 3];
-      Plane& side = sides_[k];
+      const Eigen::Vector2d& from = corners[(k + 1) % 3].at;
+      const Eigen::Vector2d& to = corners[(k + 2) % 3].at;
+      Linear& side = sides_[k];
       side = {turn * (from.y() - to.y()), turn * (to.x() - from.x()), 0.0};
       side.c = -(side.a * from.x() + side.b * from.y());
       own_[k] = side.a > 0.0 || (side.a == 0.0 && side.b > 0.0);
-      lay(plan, vertices[k], at[k], k);
     }
   }
 
@@ -137,7 +128,7 @@ class LaidTriangle {
     const int all = points.prod();
     if (all == 1) return contains(column, row) ? 1 : 0;
     bool crosses = false;
-    for (const Plane& side : sides_) {
+    for (const Linear& side : sides_) {
       const double middle = side.at(column, row);
       const double half = 0.5 * (std::abs(side.a) + std::abs(side.b));
       if (middle < -half) return 0;
@@ -166,9 +157,10 @@ class LaidTriangle {
     Field field;
     const double scale = 1.0 / std::abs(doubled_);
     for (std::size_t k = 0; k < 3; ++k) {
+      const Corner& corner = (*corners_)[k];
       field.share[k] = scale * sides_[k].at(x, y);
-      field.turns += field.share[k] * turns_[k].at(x, y);
-      field.amplitude += field.share[k] * amplitude_[k];
+      field.turns += field.share[k] * corner.turns.at(x, y);
+      field.amplitude += field.share[k] * corner.amplitude;
     }
     field.amplitude = std::max(field.amplitude, 0.0);
     if (doubled_ < 0.0) field.turns -= 0.25;
@@ -176,20 +168,11 @@ class LaidTriangle {
   }
 
  private:
-  /// Turns are the mean of the vertex's own and its tangent plane's.
-  void lay(const FieldPlan& plan, const PlaneField::Vertex& vertex, const Eigen::Vector2d& at,
-           std::size_t k) {
-    amplitude_[k] = vertex.amplitude;
-    const Eigen::Vector2d half = 0.5 / plan.wavelength * vertex.cosine.cwiseProduct(plan.step);
-    turns_[k] = {half.x(), half.y(), vertex.path / plan.wavelength - half.dot(at)};
-  }
-
+  const std::array<Corner, 3>* corners_;
   Eigen::AlignedBox2d box_;
-  std::array<Plane, 3> sides_;  ///< Opposite to the vertices; > 0 inside.
-  std::array<bool, 3> own_{};   ///< True if points on the side belong to the triangle.
-  std::array<Plane, 3> turns_;
-  std::array<double, 3> amplitude_{};
-  double doubled_ = 0.0;  ///< Twice the area; < 0 if it is turned over.
+  std::array<Linear, 3> sides_;  ///< Opposite to the vertices; > 0 inside.
+  std::array<bool, 3> own_{};    ///< True if points on the side belong to the triangle.
+  double doubled_ = 0.0;         ///< Twice the area; < 0 if it is turned over.
 };
 
 /// What PlaneField::cover() knows of a node: whether a triangle holds it, and points of its cell
@@ -201,12 +184,12 @@ constexpr std::uint8_t kPoints = 0x7f;
 template <class Take>
 void for_each_cell(const FieldPlan& plan, const LaidTriangle& triangle, const Take& take) {
   if (triangle.is_empty()) return;
-  const Eigen::Vector2d last(plan.columns - 1, plan.rows - 1);
-  const Eigen::Vector2d low = (triangle.box().min().array() + 0.5).floor().max(0.0);
-  const Eigen::Vector2d high =
-      (triangle.box().max().array() + 0.5).floor().min(last.array()).max(-1.0);
-  const auto from = low.cwiseMin(last + Eigen::Vector2d::Ones()).cast<int>().eval();
-  const auto to = high.cast<int>().eval();
+  // Numbers from 0 on lose their fraction when they become whole.
+  const Eigen::Array2d last(plan.columns, plan.rows);
+  const Eigen::Array2d low = (triangle.box().min().array() + 0.5).max(0.0).min(last);
+  const Eigen::Array2d high = (triangle.box().max().array() + 1.5).max(0.0).min(last);
+  const Eigen::Array2i from = low.cast<int>();
+  const Eigen::Array2i to = high.cast<int>() - 1;
   for (int j = from.y(); j <= to.y(); ++j) {
     for (int i = from.x(); i <= to.x(); ++i) {
       take(i, j,
@@ -233,9 +216,19 @@ PlaneField::PlaneField(const FieldPlan& plan)
     : plan_(plan),
       values_(static_cast<std::size_t>(plan.columns) * static_cast<std::size_t>(plan.rows)) {}
 
-void PlaneField::cover(const std::array<Vertex, 3>& vertices) {
+/// Turns are the mean of the vertex's own and its tangent plane's.
+PlaneField::Corner PlaneField::corner(const FieldPlan& plan, const Vertex& vertex) {
+  const Eigen::Vector2d steps =
+      (vertex.place - plan.centre).cwiseQuotient(plan.step) + plan.middle();
+  const Eigen::Array2d parts = kParts * steps.array();
+  const Eigen::Vector2d at = ((parts + kRounds) - kRounds) / kParts;
+  const Eigen::Vector2d half = 0.5 / plan.wavelength * vertex.cosine.cwiseProduct(plan.step);
+  return {at, {half.x(), half.y(), vertex.path / plan.wavelength - half.dot(at)}, vertex.amplitude};
+}
+
+void PlaneField::cover(const std::array<Corner, 3>& corners) {
   lit_.resize(values_.size());
-  const LaidTriangle triangle(plan_, vertices);
+  const LaidTriangle triangle(corners);
   for_each_cell(plan_, triangle, [&](int i, int j, std::size_t node) {
     const int points = (lit_[node] & kPoints) + triangle.points_inside(plan_.points, i, j);
     const bool centre = (lit_[node] & kCentre) != 0 || triangle.contains(i, j);
@@ -246,9 +239,9 @@ void PlaneField::cover(const std::array<Vertex, 3>& vertices) {
 /// A triangle's field goes on beyond its sides as a quadratic. Where a surface has detail finer
 /// than a cell that is wrong by some percent, so only cells without another have it.
 template <class Take>
-void PlaneField::for_each_node(const std::array<Vertex, 3>& vertices, Where where,
+void PlaneField::for_each_node(const std::array<Corner, 3>& corners, Where where,
                                const Take& take) const {
-  const LaidTriangle triangle(plan_, vertices);
+  const LaidTriangle triangle(corners);
   const double all = plan_.points.prod();
   for_each_cell(plan_, triangle, [&](int i, int j, std::size_t node) {
     double share = 0.0;
@@ -266,8 +259,8 @@ void PlaneField::for_each_node(const std::array<Vertex, 3>& vertices, Where wher
   });
 }
 
-void PlaneField::add(const std::array<Vertex, 3>& vertices, Where where) {
-  for_each_node(vertices, where, [&](std::size_t node, const LaidTriangle::Field& field) {
+void PlaneField::add(const std::array<Corner, 3>& corners, Where where) {
+  for_each_node(corners, where, [&](std::size_t node, const LaidTriangle::Field& field) {
     pending_.node.push_back(node);
     pending_.turns.push_back(field.turns);
     pending_.amplitude.push_back(static_cast<float>(field.amplitude));
@@ -284,9 +277,9 @@ void PlaneField::lay_rest() {
   pending_.clear();
 }
 
-void PlaneField::gather(const std::array<Vertex, 3>& vertices, Where where,
+void PlaneField::gather(const std::array<Corner, 3>& corners, Where where,
                         const std::array<std::size_t, 3>& vertex, std::span<double> by_path) {
-  for_each_node(vertices, where, [&](std::size_t node, const LaidTriangle::Field& field) {
+  for_each_node(corners, where, [&](std::size_t node, const LaidTriangle::Field& field) {
     pending_.node.push_back(node);
     pending_.turns.push_back(field.turns);
     pending_.amplitude.push_back(static_cast<float>(field.amplitude));

@@ -34,6 +34,9 @@ constexpr std::int64_t kBatch = 16;
 /// the time for as many as there are. A 128² portrait on 25 mm has 2.3e9.
 constexpr double kKeptBytes = 1.5e9;
 
+/// Surfaces of one grid whose heights differ by less, in wavelengths, have the same waves.
+constexpr double kSamePath = 1e-5;
+
 /// A stretch of an axis of `all` cells, with ramps of a width but at the ends of the axis.
 Stretch stretch_of(std::int64_t begin, std::int64_t count, std::int64_t all, double ramp) {
   const std::int64_t end = begin + count;
@@ -151,19 +154,26 @@ class PointLightOf {
   }
 
  private:
-  /// For every surface of a tile the first that has the same nodes: a ball changes nothing where it
-  /// reaches the surface.
+  /// For every surface of a tile the first that has the same nodes, but for rounding: a ball
+  /// changes nothing where it reaches the surface.
   [[nodiscard]] std::vector<std::size_t> first_equal(
       const std::vector<const SurfaceNodes*>& nodes) const {
+    const double least = kSamePath * scene_.colors.front().wavelength;
     std::vector<std::size_t> first(nodes.size());
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       first[k] = k - k % surfaces_;
-      while (first[k] < k && !same(*nodes[first[k]], *nodes[k])) ++first[k];
+      while (first[k] < k && !same(*nodes[first[k]], *nodes[k], least)) ++first[k];
     }
     return first;
   }
-  static bool same(const SurfaceNodes& a, const SurfaceNodes& b) {
-    return a.place == b.place && a.slope == b.slope;
+  /// @param least  mm
+  static bool same(const SurfaceNodes& a, const SurfaceNodes& b, double least) {
+    const double per_node = least / a.spacing.maxCoeff();
+    for (std::size_t n = 0; n < a.place.size(); ++n) {
+      if (std::abs(a.place[n].z() - b.place[n].z()) > least) return false;
+      if ((a.slope[n] - b.slope[n]).lpNorm<Eigen::Infinity>() > per_node) return false;
+    }
+    return true;
   }
 
   const WaveScene& scene_;

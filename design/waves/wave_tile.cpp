@@ -83,7 +83,9 @@ class WaveTile {
         tile_(tile),
         slack_(slack),
         columns_(static_cast<int>(tile.x.nodes())),
-        rows_(static_cast<int>(tile.y.nodes())) {
+        rows_(static_cast<int>(tile.y.nodes())),
+        window_x_(windows(tile.x)),
+        window_y_(windows(tile.y)) {
     trace(plan);
   }
 
@@ -96,12 +98,12 @@ class WaveTile {
   [[nodiscard]] PlaneField on_screen() const {
     PlaneField field(plan_.field);
     if (has_edge()) {
-      for_each_laid([&](const auto& vertices, const auto& indices) {
-        if (from_edge(indices) < 2 * edge_ring()) field.cover(vertices);
+      for_each_laid([&](const auto& corners, const auto& indices) {
+        if (from_edge(indices) < 2 * edge_ring()) field.cover(corners);
       });
     }
     for_each_laid(
-        [&](const auto& vertices, const auto& indices) { field.add(vertices, where(indices)); });
+        [&](const auto& corners, const auto& indices) { field.add(corners, where(indices)); });
     field.propagate();
     return field;
   }
@@ -124,8 +126,8 @@ class WaveTile {
     field.pull(to, by_pixel);
     field.return_back();
     std::vector<double> by_path(nodes_.size(), 0.0);
-    for_each_laid([&](const auto& vertices, const auto& indices) {
-      field.gather(vertices, where(indices), indices, by_path);
+    for_each_laid([&](const auto& corners, const auto& indices) {
+      field.gather(corners, where(indices), indices, by_path);
     });
     field.gather_rest(by_path);
     for (int j = 0; j < rows_; ++j) {
@@ -270,6 +272,11 @@ class WaveTile {
     return from_centre(node) + field.distance * node.laid.cosine.cwiseQuotient(field.magnification);
   }
 
+  static Eigen::ArrayXd windows(const Stretch& axis) {
+    return Eigen::ArrayXd::NullaryExpr(axis.nodes(),
+                                       [&](Eigen::Index k) { return axis.window(axis.begin + k); });
+  }
+
   void trace_node(int i, int j) {
     const std::size_t k = index({i, j});
     const std::size_t n = on_surface(i, j);
@@ -289,7 +296,7 @@ class WaveTile {
     node.rise = color_.path.rise(p, known) - node.direction.z();
     // An outline's edge fades over one step of the rays, far below √(λ f).
     const bool in = edge_ == nullptr || edge_->contains(p.head<2>());
-    node.window = in ? tile_.x.window(tile_.x.begin + i) * tile_.y.window(tile_.y.begin + j) : 0.0;
+    node.window = in ? window_x_[i] * window_y_[j] : 0.0;
   }
 
   static bool is_bright(const Node& node) { return node.lit && node.window > 0.0; }
@@ -495,7 +502,7 @@ class WaveTile {
   [[nodiscard]] double spread(int axis, double wider) const {
     const double units = is_cut(axis == 0 ? tile_.x : tile_.y) ? kEdgeSpread : kSpread;
     return std::max(units * std::sqrt(color_.wavelength / plan_.field.distance * wider),
-                    options_.scatter);
+                    options_.scatter[axis]);
   }
   /// What scattered light needs around the rays, mm before magnification.
   [[nodiscard]] double room(int axis, double wider) const {
@@ -594,14 +601,18 @@ class WaveTile {
     pass(-1);
   }
 
-  /// Calls `take(vertices, indices)` for the lit triangles on the starting plane.
+  /// Calls `take(corners, indices)` for the lit triangles on the starting plane.
   template <class Take>
   void for_each_laid(const Take& take) const {
+    std::vector<PlaneField::Corner> corners(nodes_.size());
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      if (nodes_[k].lit) corners[k] = PlaneField::corner(plan_.field, nodes_[k].laid);
+    }
     for_each_triangle([&](const Three& t) {
       if (!is_bright(t)) return;
       const Indices indices{index(t[0]), index(t[1]), index(t[2])};
-      take(std::array<PlaneField::Vertex, 3>{nodes_[indices[0]].laid, nodes_[indices[1]].laid,
-                                             nodes_[indices[2]].laid},
+      take(std::array<PlaneField::Corner, 3>{corners[indices[0]], corners[indices[1]],
+                                             corners[indices[2]]},
            indices);
     });
   }
@@ -635,6 +646,7 @@ class WaveTile {
   Tile tile_;
   double slack_;
   int columns_, rows_;
+  Eigen::ArrayXd window_x_, window_y_;  ///< Of the columns and rows.
   std::vector<Node> nodes_;
   std::vector<Eigen::Vector3d> corners_;
   std::vector<std::uint8_t> from_edge_;  ///< By node; of a field with a hard edge.

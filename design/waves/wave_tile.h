@@ -92,6 +92,20 @@ class PlaneField {
     double amplitude = 0.0;  ///< √(light per mm²)
   };
 
+  /// A linear function of a place in steps from the first node.
+  struct Linear {
+    double a = 0.0, b = 0.0, c = 0.0;
+
+    [[nodiscard]] double at(double x, double y) const { return a * x + b * y + c; }
+  };
+  /// A ray on the nodes of a plan.
+  struct Corner {
+    Eigen::Vector2d at{0.0, 0.0};  ///< In steps from the first node.
+    Linear turns;                  ///< Phase ÷ 2π around it, as triangles lay it.
+    double amplitude = 0.0;
+  };
+  [[nodiscard]] static Corner corner(const FieldPlan& plan, const Vertex& vertex);
+
   /// Where a triangle is: at a hard edge of the field, or where triangles are all around.
   enum class Where { kInside, kAtEdge };
 
@@ -100,13 +114,13 @@ class PlaneField {
   /// Of a field with a hard edge, before the first of add(), its triangles at the edge and those
   /// that share nodes' cells with them: such cells have as much of their node's field as is lit of
   /// them.
-  void cover(const std::array<Vertex, 3>& vertices);
+  void cover(const std::array<Corner, 3>& corners);
   /// Adds the field of a triangle of neighbouring rays at the nodes inside it, or, of nodes that no
   /// triangle holds, of which a point is; at the latest when the field is propagated or lay_rest()
   /// is called. The path is the quadratic through the vertices with their directions as slopes; a
   /// triangle that is turned over is beyond a fold, where the phase is π/2 less. Points on a common
   /// side of two triangles belong to one of them.
-  void add(const std::array<Vertex, 3>& vertices, Where where = Where::kInside);
+  void add(const std::array<Corner, 3>& corners, Where where = Where::kInside);
   void lay_rest();
 
   /// Goes to the other plane by the angular spectrum: the nodes' distances are then magnified;
@@ -122,7 +136,7 @@ class PlaneField {
   /// 2π/λ · Im(Ū U*) of the nodes, U what the triangle laid there, at the latest when
   /// gather_rest() is called.
   /// @param vertex  index of each in `by_path`.
-  void gather(const std::array<Vertex, 3>& vertices, Where where,
+  void gather(const std::array<Corner, 3>& corners, Where where,
               const std::array<std::size_t, 3>& vertex, std::span<double> by_path);
   void gather_rest(std::span<double> by_path);
 
@@ -164,7 +178,7 @@ class PlaneField {
 
   /// Calls `take(node, turns, amplitude, shares)` for the nodes that a triangle lays.
   template <class Take>
-  void for_each_node(const std::array<Vertex, 3>& vertices, Where where, const Take& take) const;
+  void for_each_node(const std::array<Corner, 3>& corners, Where where, const Take& take) const;
   void go(bool back);
   void transform_rows(int sign);
   /// Transforms the columns, multiplies, and transforms them back.

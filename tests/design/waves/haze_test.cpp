@@ -117,7 +117,7 @@ std::vector<double> picture_of(const Roughness& roughness, unsigned seed = 1) {
   WaveOptions options;
   options.wavelength = kWavelength;
   options.tile = 0.0;
-  options.scatter = 0.03;
+  options.scatter.setConstant(0.03);
   return wave_flux(focus_setup(), lens_grid({kSide, kSide}, 0.004), {&field, 1}, options,
                    Executor::cpu(2), {})
       .front();

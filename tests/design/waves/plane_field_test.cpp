@@ -136,7 +136,7 @@ TEST(PlaneField, RaysBeyondAFoldHaveTheFieldOfTheWave) {
     // Up to the plane: what the converging wave lacks, and twice the way to the line.
     v.path = length + kFocus;
     v.amplitude = std::exp(-(x * x + y * y) / (kWidth * kWidth));
-    return v;
+    return PlaneField::corner(plan, v);
   };
   for (int j = 0; j < kRays; ++j) {
     for (int i = 0; i < kRays; ++i) {
@@ -164,7 +164,7 @@ TEST(PlaneField, EveryNodeOnACommonSideBelongsToOneTriangle) {
     v.place = plan.centre + Eigen::Vector2d(0.02 * (i - 8) + (j % 2) * 0.004, 0.02 * (j - 8));
     v.cosine = {0.0, 0.0};
     v.amplitude = 1.0;
-    return v;
+    return PlaneField::corner(plan, v);
   };
   for (int j = 0; j < 16; ++j) {
     for (int i = 0; i < 16; ++i) {

@@ -96,7 +96,7 @@ TEST(WavePicture, AFlatLensIsASquareAperture) {
   const std::vector<double> one = slit(2.0, 16, 75.0, 550e-6);
   // As finely as it takes, and by default.
   WaveOptions fine = in_one_piece();
-  fine.scatter = 0.04;
+  fine.scatter.setConstant(0.04);
   for (const WaveOptions& options : {fine, WaveOptions{550e-6, 0.0, 3.0, 1.5}}) {
     const std::vector<double> flux = waves(setup, flat, options, 0.04);
     for (int row = 0; row < 16; ++row) {
@@ -132,7 +132,7 @@ TEST(WavePicture, ACylindersFocusIsASinc) {
     return Eigen::Vector3d(kHeight + z, -u / root, 0.0);
   });
   WaveOptions options = in_one_piece();
-  options.scatter = 0.06;
+  options.scatter.setConstant(0.06);
   const std::vector<double> flux = waves(setup, lens, options, 0.02);
   const double pixel = kSide / 80.0;
   for (int column = 30; column < 50; ++column) {
@@ -167,7 +167,7 @@ TEST(WavePicture, OrdersOfASinusoidalRippleAreBessels) {
                              kTwoPi * amplitude / kPeriod * std::cos(phase), 0.0);
     });
     WaveOptions options = in_one_piece();
-    options.scatter = 5.0 * options.wavelength / kPeriod;
+    options.scatter.setConstant(5.0 * options.wavelength / kPeriod);
     const std::vector<double> flux = waves(setup, ripple, options, 0.01);
     const double depth = kTwoPi * (setup.ior - 1.0) * amplitude / options.wavelength;
     const double apart = 75.0 * options.wavelength / kPeriod;  // 0.69 mm
@@ -207,7 +207,7 @@ auto bumps() {
 TEST(WavePicture, TilesHaveThePictureOfOnePiece) {
   const OpticalSetup setup = setup_of(9.6, 48);
   WaveOptions finest = in_one_piece();
-  finest.scatter = 0.04;
+  finest.scatter.setConstant(0.04);
   const std::vector<double> whole = waves(setup, bumps(), finest);
   EXPECT_LT(difference(waves(setup, bumps(), {}), whole), 2e-4);
   EXPECT_NEAR(sum_of(whole), 1.0, 0.02);
