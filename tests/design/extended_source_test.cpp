@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <vector>
 
@@ -153,6 +154,32 @@ TEST(ExtendedPicture, TheConvolutionIsCloseToTheSumOverTheSource) {
     }
   }
   EXPECT_LT(off, 0.02);
+}
+
+/// The bumps' picture through a mesh.
+PointPicture bumps_through(const GridShape& shape) {
+  const SurfaceMesh mesh = testing::height_field({24.0, 20.0}, shape, testing::bumps);
+  return [mesh](const OpticalSetup& one) {
+    return flux_of_surface(mesh, one, SurfaceModel::kSmooth, Executor::serial());
+  };
+}
+
+/// Sum of differences of two pictures.
+double apart(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += std::fabs(a[i] - b[i]);
+  return sum;
+}
+
+TEST(ExtendedPicture, FewRaysOfEveryPointShowWhatManyShow) {
+  OpticalSetup setup = testing::setup_of({24.0, 20.0}, {24, 20}, 60.0);
+  setup.extent.width = 0.05;
+  const PointPicture few = bumps_through({49, 41});
+  const PointPicture many = bumps_through({193, 161});
+  const std::vector<double> exact = picture_under(setup, 64, many);
+  const std::vector<double> mixed =
+      picture_under_few_rays(setup, 5.0, 64, few, many, Executor::serial());
+  EXPECT_LT(apart(mixed, exact), 0.25 * apart(picture_under(setup, 64, few), exact));
 }
 
 TEST(SourceLimit, IsTheTargetWhereTheSourceCouldMakeIt) {
