@@ -70,8 +70,11 @@ constexpr double kMemoryPerMove = 1000.0;  ///< Bytes: exact, fitted and written
 /// Bytes: the path of a machine with a pitch error, 617 instead of 534 MB for a lens of 100 x 67 mm
 /// at a pitch of 0.08 mm.
 constexpr double kStretchedMemoryPerMove = 400.0;
-constexpr double kMemory = 1.5e8;          ///< Bytes of everything else.
-constexpr double kMemoryPerNode = 200.0;   ///< Bytes of milled.ply and of its sources.
+constexpr double kMemory = 1.5e8;         ///< Bytes of everything else.
+constexpr double kMemoryPerNode = 200.0;  ///< Bytes of milled.ply and of its sources.
+/// Bytes of a spline's facets for the ball's reach; portraits of 128² and 256² as designed for
+/// them.
+constexpr double kMemoryPerSplinePixel = 1.8e4;
 constexpr double kDiskPerNode = 50.0;      ///< Bytes of a vertex and two triangles.
 constexpr double kSecondsPerMm = 2e-4;     ///< Of a finishing row: drop curve, fit, reading back.
 constexpr double kMinSecondsPerMm = 1e-4;  ///< With any tolerance.
@@ -226,9 +229,17 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
                              nodes_of(size) * kMemoryPerNode +
                              part_nodes(options, setup) * kMemoryPerPartNode;
     if (may_take_waves(options, setup)) estimate.memory_bytes += kMemoryOfWaves;
+    if (options.surface == SurfaceModel::kSpline) {
+      estimate.memory_bytes += setup.pixels.cast<double>().prod() * kMemoryPerSplinePixel;
+    }
     estimate.disk_bytes += nodes_of(size) * kDiskPerNode;
   }
   return estimate;
+}
+
+WorkEstimate estimate_cut(CamOptions options, const Lens& lens, int threads) {
+  options.surface = options.surface.value_or(lens.model);
+  return estimate_cut(options, lens.setup, threads);
 }
 
 void require_room_for_cut(const CamOptions& options, const OpticalSetup& setup,

@@ -74,6 +74,8 @@ void remove_cut(const std::filesystem::path& folder);
 /// spacing, and is good to a factor of about three because surfaces differ in how often they bend.
 /// @param threads  number of threads, ≥ 1. @pre validate() passed.
 WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, int threads);
+/// The same of a lens, whose model counts where the options name none.
+WorkEstimate estimate_cut(CamOptions options, const Lens& lens, int threads);
 
 /// Limits of a cut's estimate: six weeks of one processor core, 100 GB of programs.
 inline constexpr double kMaxCutSeconds = 1000.0 * 3600.0;

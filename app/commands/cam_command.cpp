@@ -169,7 +169,7 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
 CommandResult cut(CommandFrame& frame, const CamSettings& settings, const Lens& lens) {
   const CamOptions& cam = settings.cam;
   const OptionSet& options = frame.options();
-  const WorkEstimate estimate = estimate_cut(cam, lens.setup, options.executor().concurrency());
+  const WorkEstimate estimate = estimate_cut(cam, lens, options.executor().concurrency());
   require_room_for_cut(cam, lens.setup, estimate, settings.folder());
   frame.begin_folder(settings.folder()).remove_partial_files(is_name_of_cut);
   announce_work(estimate, frame.console(), "the cut takes");

@@ -239,7 +239,7 @@ py::object cam(const fs::path& lens, const app::OptionValues& values, const py::
     validate(settings.cam, designed.setup);
     const Executor executor = options.executor();
     require_room_for_cut(settings.cam, designed.setup,
-                         estimate_cut(settings.cam, designed.setup, executor.concurrency()),
+                         estimate_cut(settings.cam, designed, executor.concurrency()),
                          settings.folder());
     const app::OutputFolder folder(settings.folder(), FolderLock::Kind::kExclusive);
     folder.remove_partial_files(is_name_of_cut);

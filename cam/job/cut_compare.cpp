@@ -231,7 +231,7 @@ WorkEstimate require_room_for_comparison(const Lens& lens, const CamOptions& opt
   WorkEstimate all;
   for (const Choice& choice : combinations(options, choices)) {
     validate(choice.options.workshop, "--compare");
-    const WorkEstimate one = estimate_cut(choice.options, lens.setup, threads);
+    const WorkEstimate one = estimate_cut(choice.options, lens, threads);
     require_room_for_cut(choice.options, lens.setup, one, folder);
     all.seconds += one.seconds;
     all.disk_bytes = std::max(all.disk_bytes, one.disk_bytes);

@@ -281,7 +281,7 @@ NestPlan plan_nest(const std::vector<NestLens>& lenses, const NestOptions& optio
 WorkEstimate estimate_nest(const NestPlan& plan, const std::vector<NestLens>& lenses, int threads) {
   WorkEstimate sum;
   for (std::size_t k = 0; k < lenses.size(); ++k) {
-    const WorkEstimate one = estimate_cut(plan.cuts[k], lenses[k].lens->setup, threads);
+    const WorkEstimate one = estimate_cut(plan.cuts[k], *lenses[k].lens, threads);
     sum.seconds += one.seconds;
     sum.disk_bytes += one.disk_bytes;
     sum.memory_bytes += one.memory_bytes;

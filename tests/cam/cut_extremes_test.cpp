@@ -244,6 +244,15 @@ TEST(CutExtremes, TheEstimateGrowsWithEverythingThatTakesTime) {
   EXPECT_LT(estimate_cut(usual, setup, 8).seconds, before.seconds);
 }
 
+TEST(CutExtremes, TheEstimateKnowsWhatASplineTakes) {
+  Lens lens = small_lens();
+  lens.setup.pixels = {256, 256};
+  lens.model = SurfaceModel::kSmooth;
+  const double smooth = estimate_cut(CamOptions(), lens, 1).memory_bytes;
+  lens.model = SurfaceModel::kSpline;
+  EXPECT_GT(estimate_cut(CamOptions(), lens, 1).memory_bytes, smooth + 1e9);
+}
+
 TEST(CutExtremes, RefusalsNameTheSmallestToleranceThatDecimalsHold) {
   CamOptions options;
   options.post = find_post("fanuc", "--post");
