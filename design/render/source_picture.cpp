@@ -60,11 +60,11 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count, const Po
 }
 
 std::vector<double> picture_under_few_rays(const OpticalSetup& setup, double z, int count,
-                                           const PointPicture& few, const PointPicture& many,
-                                           const Executor& executor, const RunControl& control) {
-  std::vector<double> sum = picture_under(setup, count, few, control);
-  const std::vector<double> coarse = picture_by_convolution(setup, z, few, executor);
-  const std::vector<double> fine = picture_by_convolution(setup, z, many, executor);
+                                           const RayPictures& rays, const Executor& executor,
+                                           const RunControl& control) {
+  std::vector<double> sum = picture_under(setup, count, rays.few, control);
+  const std::vector<double> coarse = picture_by_convolution(setup, z, rays.few, executor);
+  const std::vector<double> fine = picture_by_convolution(setup, z, rays.many, executor);
   for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += fine[i] - coarse[i];
   return sum;
 }
@@ -108,9 +108,8 @@ std::vector<double> flux_under_source(const Lens& lens, const OpticalSetup& setu
   if (setup.extent.none() || samples <= kMeshSamples) {
     return picture_under(setup, count, picture(samples), control);
   }
-  return picture_under_few_rays(setup, surface_height(lens), count,
-                                picture(std::max(kMeshSamples, samples / 2)), picture(samples),
-                                executor, control);
+  const RayPictures rays{picture(std::max(kMeshSamples, samples / 2)), picture(samples)};
+  return picture_under_few_rays(setup, surface_height(lens), count, rays, executor, control);
 }
 
 SourceCheck check_source(const Lens& lens, const Executor& executor, const RunControl& control) {

@@ -39,11 +39,16 @@ std::vector<double> picture_under(const OpticalSetup& setup, int count, const Po
 std::vector<double> picture_by_convolution(const OpticalSetup& setup, double z,
                                            const PointPicture& picture, const Executor& executor);
 
+/// A point's picture by few and by many rays.
+struct RayPictures {
+  PointPicture few;
+  PointPicture many;
+};
+
 /// picture_under() with few rays from every point, and by convolution what more rays change.
-/// @param few, many  the point's picture by few and by many rays. @param z  of the surface, mm.
+/// @param z  of the surface, mm.
 std::vector<double> picture_under_few_rays(const OpticalSetup& setup, double z, int count,
-                                           const PointPicture& few, const PointPicture& many,
-                                           const Executor& executor,
+                                           const RayPictures& rays, const Executor& executor,
                                            const RunControl& control = {});
 
 /// Picture to optimise for, so that the exact picture becomes `target`: the target minus the

@@ -449,8 +449,8 @@ Image corrected_target(const DesignTask& task, const DesignLog& log, const Level
       picture_by_convolution(problem.setup, z, seen, task.executor);
   const int points = source_point_count(problem.setup, z);
   const std::vector<double> exact =
-      level.spline ? picture_under_few_rays(problem.setup, z, points, seen,
-                                            picture(kCorrectionSamples), task.executor)
+      level.spline ? picture_under_few_rays(problem.setup, z, points,
+                                            {seen, picture(kCorrectionSamples)}, task.executor)
                    : picture_under(problem.setup, points, seen);
   return corrected(target, exact, convolved);
 }

@@ -178,7 +178,7 @@ TEST(ExtendedPicture, FewRaysOfEveryPointShowWhatManyShow) {
   const PointPicture many = bumps_through({193, 161});
   const std::vector<double> exact = picture_under(setup, 64, many);
   const std::vector<double> mixed =
-      picture_under_few_rays(setup, 5.0, 64, few, many, Executor::serial());
+      picture_under_few_rays(setup, 5.0, 64, {few, many}, Executor::serial());
   EXPECT_LT(apart(mixed, exact), 0.25 * apart(picture_under(setup, 64, few), exact));
 }
 

@@ -61,7 +61,8 @@ TEST(WaveLeakage, OfARippleIsInItsOrders) {
   const LeakageResult rays =
       measure_leakage(chain, target, setup, {}, Executor::serial(), RunControl());
   // Twice the orders' angle: on a lens this small what the rim sends there counts.
-  chain.waves = {kWavelength, 2.0 * kWavelength / kPeriod, &rays.designed};
+  chain.waves = {kWavelength, Eigen::Vector2d::Constant(2.0 * kWavelength / kPeriod),
+                 &rays.designed};
   const WaveLeakage waves = measure_waves(chain, target, setup, {}, Executor::cpu(2), RunControl());
   const double phase = 2.0 * std::numbers::pi * (setup.optics.ior - 1.0) * kDepth / kWavelength;
   const double orders = 2.0 * std::pow(std::cyl_bessel_j(1, phase), 2);
@@ -107,7 +108,7 @@ TEST(WaveLeakage, HazeIsOnThePictureByWaves) {
   const Image target = render_field(flat, setup, Executor::serial(), RunControl()).image(4000.0);
   const LeakageResult rays =
       measure_leakage(chain, target, setup, {}, Executor::serial(), RunControl());
-  chain.waves = {kWavelength, 0.0, &rays.designed};
+  chain.waves = {kWavelength, {0.0, 0.0}, &rays.designed};
   const LeakageResult waves =
       measure_waves(chain, target, setup, {}, Executor::cpu(2), RunControl()).result;
   for (const LeakageResult* result : {&rays, &waves}) {

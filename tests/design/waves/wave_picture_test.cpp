@@ -97,7 +97,7 @@ TEST(WavePicture, AFlatLensIsASquareAperture) {
   // As finely as it takes, and by default.
   WaveOptions fine = in_one_piece();
   fine.scatter.setConstant(0.04);
-  for (const WaveOptions& options : {fine, WaveOptions{550e-6, 0.0, 3.0, 1.5}}) {
+  for (const WaveOptions& options : {fine, WaveOptions{550e-6, {0.0, 0.0}, 3.0, 1.5}}) {
     const std::vector<double> flux = waves(setup, flat, options, 0.04);
     for (int row = 0; row < 16; ++row) {
       for (int column = 0; column < 16; ++column) {
@@ -348,7 +348,7 @@ TEST(WavePicture, OfAnObliqueMirrorIsTheIntegralOverIt) {
                            kBend * u + kHigh * kTurns * std::cos(kTurns * u), 0.0);
   };
   const std::vector<double> expected = by_integral(setup, profile);
-  for (const WaveOptions& options : {WaveOptions{550e-6, 0.0, 8.0, 3.0}, in_one_piece()}) {
+  for (const WaveOptions& options : {WaveOptions{550e-6, {0.0, 0.0}, 8.0, 3.0}, in_one_piece()}) {
     const std::vector<double> flux = waves(setup, surface_of(profile), options);
     double error = 0.0;
     for (std::size_t column = 0; column < 40; ++column) {
