@@ -68,6 +68,10 @@ HeightSpline::HeightSpline(HeightGrid grid) : grid_(std::move(grid)) {
   coefficients_.assign(all.data(), all.data() + all.size());
 }
 
+Eigen::MatrixXd HeightSpline::coefficient_matrix(int samples) {
+  return coefficients_of(Lines::Identity(samples, samples));
+}
+
 float HeightSpline::lowest() const {
   return *std::min_element(grid_.heights.begin(), grid_.heights.end());
 }

@@ -45,6 +45,9 @@ class HeightSpline {
     const std::ptrdiff_t width = grid_.columns + 2 * kBeyond;
     return coefficients_[static_cast<std::size_t>((j + kBeyond) * width + i + kBeyond)];
   }
+  /// The coefficients of n samples along an axis as a matrix, (n + 2 kBeyond) × n. Both axes
+  /// together: C = X S Yᵀ, with the columns of S and C along y. @pre n ≥ kMinHeightSamples.
+  static Eigen::MatrixXd coefficient_matrix(int samples);
   [[nodiscard]] float lowest() const;  ///< Minimum of the samples.
   [[nodiscard]] float highest() const;
 
@@ -121,6 +124,12 @@ struct FrontPoint {
   Eigen::Vector3d bend;  ///< ∂²z/∂x², ∂²z/∂x∂y, ∂²z/∂y²
 };
 
+/// Derivatives by the front's height and gradient at a point.
+struct FrontBar {
+  double height = 0.0;
+  Eigen::Vector2d gradient{0.0, 0.0};
+};
+
 /// The front as a height field z = h(x, y). For a sphere, with ρ the distance from the apex in x
 /// and y and κ one over the radius, h = apex + κρ² / (1 + √(1 − κ²ρ²)); with κ = 0 it is the plane
 /// z = 0. For a height map it is a view of the spline's coefficients, which must outlive it.
@@ -175,6 +184,19 @@ class FrontSurface {
     const double k = curvature_ * by_cosine;
     return {height(xy), g,
             k * Eigen::Vector3d(1.0 + g.x() * g.x(), g.x() * g.y(), 1.0 + g.y() * g.y())};
+  }
+  /// Adjoint of a height map's coefficients ↦ at(xy).z and .gradient: adds to their derivatives,
+  /// which are in the order of coefficients(). @pre is_height_map().
+  LF_HD void at_adjoint(const Eigen::Vector2d& xy, const FrontBar& bar, double* sum) const {
+    const SplineWeights u((xy.x() - apex_.x()) * per_mm_x_, columns_);
+    const SplineWeights v((xy.y() - apex_.y()) * per_mm_y_, rows_);
+    const Eigen::Vector2d by_t(per_mm_x_ * bar.gradient.x(), per_mm_y_ * bar.gradient.y());
+    for (int j = 0; j < 4; ++j) {
+      double* const line = sum + (v.first + j) * (columns_ + 2 * HeightSpline::kBeyond) + u.first;
+      const double by_value = v.value[j] * bar.height + v.slope[j] * by_t.y();
+      const double by_slope = v.value[j] * by_t.x();
+      for (int i = 0; i < 4; ++i) line[i] += u.value[i] * by_value + u.slope[i] * by_slope;
+    }
   }
 
  private:

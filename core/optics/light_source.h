@@ -40,11 +40,13 @@ struct IncidentRay {
   /// Adjoint of p ↦ direction(): the derivative by p.
   [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d direction_adjoint(
       const Eigen::Vector3d& a_bar) const {
+    return by_point(m_by_p, slope_bar(a_bar));
+  }
+  /// Adjoint of m ↦ direction().
+  [[nodiscard]] LF_HD LF_INLINE Eigen::Vector2d slope_bar(const Eigen::Vector3d& a_bar) const {
     // a is w/|w| of w = (m, 1), or its opposite: ∂a/∂w = a_z (1 − a aᵀ).
     const double along = a_z * (m.x() * a_bar.x() + m.y() * a_bar.y() + a_bar.z());
-    const Eigen::Vector2d m_bar(a_z * (a_bar.x() - along * a_z * m.x()),
-                                a_z * (a_bar.y() - along * a_z * m.y()));
-    return by_point(m_by_p, m_bar);
+    return {a_z * (a_bar.x() - along * a_z * m.x()), a_z * (a_bar.y() - along * a_z * m.y())};
   }
   /// Adjoint of p ↦ entry(): the derivative by p.
   [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d entry_adjoint(const Eigen::Vector3d& e_bar) const {
@@ -290,6 +292,38 @@ struct FrontRefraction {
   }
 };
 
+/// Adjoint of (h, ∇h) ↦ slope() of a FrontRefraction at a fixed x.
+LF_HD inline FrontBar front_slope_adjoint(const FrontLight& light, const IncidentRay& ray,
+                                          const Eigen::Vector2d& m_bar) {
+  const Eigen::Vector3d w(-ray.gradient.x(), -ray.gradient.y(), 1.0);
+  const double length = w.norm();
+  const Eigen::Vector3d n = w / length;
+  const Eigen::Vector3d way = light.point ? Eigen::Vector3d(ray.entry() - light.from) : light.from;
+  const double distance = way.norm();
+  const Eigen::Vector3d a = way / distance;
+  const double eta = 1.0 / light.ior;
+  const Eigen::Vector3d b_bar = Eigen::Vector3d(m_bar.x(), m_bar.y(), -ray.m.dot(m_bar)) / ray.a_z;
+  const Eigen::Vector3d w_bar = normalize_adjoint(n, length, refract_adjoint(a, n, eta, b_bar));
+  FrontBar bar{0.0, {-w_bar.x(), -w_bar.y()}};
+  if (light.point) {
+    const Eigen::Vector3d a_bar = refract_adjoint_by_incident(a, n, eta, b_bar);
+    bar.height = normalize_adjoint(a, distance, a_bar).z();
+  }
+  return bar;
+}
+
+/// Adjoint of a front ↦ direction() and entry() of the ray through it that reaches p: the
+/// derivative by the front's height and gradient at the ray's x. The ray's x solves F = x + (p_z −
+/// h) m − p_xy = 0, so by the implicit function ∂x/∂(h, ∇h) = −(∂x/∂p) ∂F/∂(h, ∇h).
+LF_HD inline FrontBar front_adjoint(const FrontLight& light, const IncidentRay& ray, double p_z,
+                                    const Eigen::Vector3d& a_bar, const Eigen::Vector3d& e_bar) {
+  // Derivative by p_xy, through x and through m at x.
+  const Eigen::Vector2d p_bar = (ray.direction_adjoint(a_bar) + ray.entry_adjoint(e_bar)).head<2>();
+  FrontBar bar = front_slope_adjoint(light, ray, ray.slope_bar(a_bar) - (p_z - ray.z) * p_bar);
+  bar.height += ray.m.dot(p_bar) + e_bar.z();
+  return bar;
+}
+
 /// Newton's method ends at a step below kNearEntry of the point's coordinates plus kTinyEntry mm.
 /// That step is taken to first order, so the error is of the order of its square. Lenses need three
 /// or four steps.
@@ -298,11 +332,10 @@ inline constexpr double kTinyEntry = 1e-12;
 inline constexpr int kMaxEntrySteps = 30;
 
 /// The ray from a source through a curved front to a point p behind it: Newton's method on x + (p_z
-/// − h(x)) m(x) = p_xy. All NaN if no ray reaches p.
+/// − h(x)) m(x) = p_xy. All NaN if no ray reaches p. @param x  where to start.
 LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const FrontLight& light,
-                                           const Eigen::Vector3d& p) {
+                                           const Eigen::Vector3d& p, Eigen::Vector2d x) {
   IncidentRay found = FrontRefraction().ray(Eigen::Matrix2d::Identity());
-  Eigen::Vector2d x(p.x(), p.y());
   if (!front.covers(x)) return found;
   for (int i = 0; i < kMaxEntrySteps; ++i) {
     FrontRefraction ray(front, light, x);
@@ -325,6 +358,10 @@ LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const Fron
     x -= step;
   }
   return found;
+}
+LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const FrontLight& light,
+                                           const Eigen::Vector3d& p) {
+  return ray_through_front(front, light, p, {p.x(), p.y()});
 }
 
 /// The light before the surface: its direction at a point, and the amount that a triangle takes in.
@@ -429,11 +466,19 @@ class LightSource {
       area_normal_bar.z() += 0.5 * bar;
     } else if (!varies()) {
       area_normal_bar += (0.5 * bar / direction_.z()) * direction_;
-    } else if (kind_ == Kind::kParallelBent) {
-      bent_intake_adjoint(t, bar, t_bar, known);
     } else {
-      point_intake_adjoint(t, bar, t_bar, known);
+      varied_intake_adjoint(t, bar, t_bar, known);
     }
+  }
+
+  /// intake() of a triangle whose rays enter at these points, and the derivatives by them.
+  /// @pre is_bent().
+  [[nodiscard]] LF_HD double intake_at(const Corners& entries) const {
+    return intake_of_vectors(vectors_from(entries));
+  }
+  [[nodiscard]] LF_HD Corners intake_at_adjoint(const Corners& entries, double bar) const {
+    const VectorsBar r_bar = intake_of_vectors_adjoint(vectors_from(entries), bar);
+    return {r_bar.a, r_bar.b, r_bar.c};
   }
 
  private:
@@ -479,6 +524,9 @@ class LightSource {
                                                       const CornerRays& known) const {
     return {vector_to(t.v0, known.r0), vector_to(t.v1, known.r1), vector_to(t.v2, known.r2)};
   }
+  [[nodiscard]] LF_HD LF_INLINE VectorsBar vectors_from(const Corners& entries) const {
+    return {entries.v0 - position_, entries.v1 - position_, entries.v2 - position_};
+  }
   [[nodiscard]] LF_HD LF_INLINE Eigen::Vector3d vector_adjoint(const Eigen::Vector3d& p,
                                                                const Eigen::Vector3d& bar,
                                                                const IncidentRay* known) const {
@@ -491,23 +539,27 @@ class LightSource {
   }
   [[nodiscard]] LF_HD LF_APART double varied_intake(const Corners& t,
                                                     const CornerRays& known) const {
-    const VectorsBar r = vectors_to(t, known);
+    return intake_of_vectors(vectors_to(t, known));
+  }
+  LF_HD LF_APART void varied_intake_adjoint(const Corners& t, double bar, Corners& t_bar,
+                                            const CornerRays& known) const {
+    const VectorsBar r_bar = intake_of_vectors_adjoint(vectors_to(t, known), bar);
+    t_bar.v0 += vector_adjoint(t.v0, r_bar.a, known.r0);
+    t_bar.v1 += vector_adjoint(t.v1, r_bar.b, known.r1);
+    t_bar.v2 += vector_adjoint(t.v2, r_bar.c, known.r2);
+  }
+  [[nodiscard]] LF_HD LF_INLINE double intake_of_vectors(const VectorsBar& r) const {
     if (kind_ == Kind::kParallelBent) return area_across({r.a, r.b, r.c});
     const double even = scale_ * SolidAngle(r.a, r.b, r.c).value();
     return lambertian() ? even * cosine(r) : even;
   }
-  LF_HD LF_APART void bent_intake_adjoint(const Corners& t, double bar, Corners& t_bar,
-                                          const CornerRays& known) const {
-    const VectorsBar r = vectors_to(t, known);
-    Corners r_bar;
-    area_normal_adjoint({r.a, r.b, r.c}, (0.5 * bar / direction_.z()) * direction_, r_bar);
-    t_bar.v0 += vector_adjoint(t.v0, r_bar.v0, known.r0);
-    t_bar.v1 += vector_adjoint(t.v1, r_bar.v1, known.r1);
-    t_bar.v2 += vector_adjoint(t.v2, r_bar.v2, known.r2);
-  }
-  LF_HD LF_APART void point_intake_adjoint(const Corners& t, double bar, Corners& t_bar,
-                                           const CornerRays& known) const {
-    const VectorsBar r = vectors_to(t, known);
+  [[nodiscard]] LF_HD LF_INLINE VectorsBar intake_of_vectors_adjoint(const VectorsBar& r,
+                                                                     double bar) const {
+    if (kind_ == Kind::kParallelBent) {
+      Corners r_bar;
+      area_normal_adjoint({r.a, r.b, r.c}, (0.5 * bar / direction_.z()) * direction_, r_bar);
+      return {r_bar.v0, r_bar.v1, r_bar.v2};
+    }
     const double share = lambertian() ? cosine(r) : 1.0;
     VectorsBar r_bar = solid_angle_adjoint(r.a, r.b, r.c, scale_ * share * bar);
     if (lambertian()) {
@@ -519,9 +571,7 @@ class LightSource {
       r_bar.b += each;
       r_bar.c += each;
     }
-    t_bar.v0 += vector_adjoint(t.v0, r_bar.a, known.r0);
-    t_bar.v1 += vector_adjoint(t.v1, r_bar.b, known.r1);
-    t_bar.v2 += vector_adjoint(t.v2, r_bar.c, known.r2);
+    return r_bar;
   }
 
   Eigen::Vector3d direction_;  ///< Behind a flat front or before a curved one.
