@@ -127,6 +127,38 @@ SurfaceMesh node_mesh(const GridShape& shape) {
           grid_triangles(shape), shape};
 }
 
+/// Points of a front at which its light is checked for folds, per cell each way.
+constexpr int kFoldPoints = 2;
+
+/// Minimum area of the triangles between them, as a share of the even ones': the light behind the
+/// front is then at most that much brighter.
+constexpr double kLeastLight = 0.02;
+
+/// Cells beyond a front's edges that are checked, too: its curvature ends within the first.
+constexpr int kCellsBeyond = 2;
+
+SurfaceMesh even_mesh(const Eigen::Vector2d& size, const GridShape& front) {
+  const Eigen::Vector2d cells(front.columns - 1, front.rows - 1);
+  const Eigen::Vector2d beyond = kCellsBeyond * size.cwiseQuotient(cells);
+  const auto points = [](int samples) {
+    return kFoldPoints * (samples - 1 + 2 * kCellsBeyond) + 1;
+  };
+  SurfaceMesh mesh =
+      make_grid_mesh(size + 2.0 * beyond, {points(front.columns), points(front.rows)}, 0.0);
+  mesh.vertices.topRows<2>().colwise() -= beyond;
+  return mesh;
+}
+
+/// Value of the area barrier of a triangle; sets the derivatives by its corners.
+double measure_area(const Corners& t, const AreaBarrier& barrier, double weight, Corners& bar) {
+  const ValueSlope area = area_barrier(plan_area(t), barrier);
+  bar = {};
+  if (std::isfinite(area.value)) {
+    area_normal_adjoint(t, Eigen::Vector3d(0.0, 0.0, 0.5 * weight * area.slope), bar);
+  }
+  return area.value;
+}
+
 /// Sum over the corners around a vertex.
 Eigen::Vector3d gathered(const MeshView& mesh, const std::vector<Corners>& bars, std::int64_t v) {
   Eigen::Vector3d sum(0.0, 0.0, 0.0);
@@ -157,7 +189,13 @@ TwoFaceObjective::TwoFaceObjective(const GridShape& net, const GridShape& front,
       y_basis_(HeightSpline::coefficient_matrix(front.rows)),
       shape_(std::make_shared<HeightFront>(
           height_front(Eigen::MatrixXd::Zero(front.columns, front.rows), size_))),
-      source_(behind(goals.front().setup, *shape_)) {
+      source_(behind(goals.front().setup, *shape_)),
+      even_(even_mesh(size_, front)),
+      even_topology_(even_, make_topology(even_), executor),
+      even_area_(default_area_barrier(goals.front().setup, even_.triangle_count(), kLeastLight)),
+      even_rays_(static_cast<std::size_t>(even_.vertex_count())),
+      even_landing_(3, even_.vertex_count()),
+      even_bar_(static_cast<std::size_t>(even_.triangle_count())) {
   const std::int64_t nodes = mesh_.vertex_count();
   const std::int64_t faces = mesh_.triangle_count();
   for (const ScreenGoal& goal : goals) {
@@ -226,19 +264,13 @@ bool TwoFaceObjective::find_rays(const LensFaces& faces) {
 bool TwoFaceObjective::measure_faces() {
   const MeshView mesh = topology_.view();
   const double weight = options_.weights.barrier;
-  const auto barrier_of = [&](const Corners& t, Corners& bar) {
-    const ValueSlope area = area_barrier(plan_area(t), options_.area);
-    bar = {};
-    if (!std::isfinite(area.value)) return area.value;
-    area_normal_adjoint(t, Eigen::Vector3d(0.0, 0.0, 0.5 * weight * area.slope), bar);
-    return area.value;
-  };
   const auto measure = [&](std::int64_t i) -> std::array<double, 2> {
     const auto face = static_cast<std::size_t>(i);
     const Corners entering = entries(i);
     flux_[face] = source_.intake_at(entering);
-    const double barrier = barrier_of(entering, entry_bar_[face]) +
-                           barrier_of(mesh.corners(positions_.data(), i), exit_bar_[face]);
+    const Corners leaving = mesh.corners(positions_.data(), i);
+    const double barrier = measure_area(entering, options_.area, weight, entry_bar_[face]) +
+                           measure_area(leaving, options_.area, weight, exit_bar_[face]);
     return {flux_[face], barrier};
   };
   const auto [intake, barrier] =
@@ -249,6 +281,29 @@ bool TwoFaceObjective::measure_faces() {
   const auto share = [&](std::int64_t i) { flux_[static_cast<std::size_t>(i)] /= intake_; };
   parallel_for(executor_, "shares of flux", mesh.faces, share);
   return true;
+}
+
+/// Sends rays from even points of the front to FaceLimits::unfolded_to; adds the barrier of the
+/// triangles between them, and computes the derivatives by their corners. False if one is folded.
+bool TwoFaceObjective::measure_light_behind_front() {
+  const FrontLight light = source_.before_front();
+  const auto land = [&](std::int64_t v) {
+    FrontRefraction& ray = even_rays_[static_cast<std::size_t>(v)];
+    ray = FrontRefraction(source_.front(), light, even_.vertices.col(v).head<2>());
+    const Eigen::Vector2d m = ray.slope();
+    even_landing_.col(v) << ray.e.head<2>() + (limits_.unfolded_to - ray.e.z()) * m, 0.0;
+    if (!ray.lit || !(ray.b.z() > 0.0)) even_landing_.col(v) = FrontRefraction::unknown();
+  };
+  parallel_for(executor_, "light behind the front", even_.vertex_count(), land);
+  const MeshView mesh = even_topology_.view();
+  const auto measure = [&](std::int64_t i) -> std::array<double, 1> {
+    return {measure_area(mesh.corners(even_landing_.data(), i), even_area_,
+                         options_.weights.barrier, even_bar_[static_cast<std::size_t>(i)])};
+  };
+  const double barrier =
+      pending_sum<1>(executor_, "folds behind the front", mesh.faces, measure).get()[0];
+  barrier_ += barrier;
+  return std::isfinite(barrier);
 }
 
 /// Adds the derivatives by the fluxes, shares of their sum, to those by the points of entry.
@@ -306,6 +361,16 @@ void TwoFaceObjective::add_front_bars(LensFaces& gradient) {
   for (std::size_t v = 0; v < rays_.size(); ++v) {
     source_.front().at_adjoint(rays_[v].x, front_bar_[v], coefficients_bar_.data());
   }
+  const MeshView even = even_topology_.view();
+  for (std::int64_t v = 0; v < even.vertices; ++v) {
+    const IncidentRay ray =
+        even_rays_[static_cast<std::size_t>(v)].ray(Eigen::Matrix2d::Identity());
+    const Eigen::Vector2d bar = gathered(even, even_bar_, v).head<2>();
+    FrontBar front_bar =
+        front_slope_adjoint(source_.before_front(), ray, (limits_.unfolded_to - ray.z) * bar);
+    front_bar.height -= ray.m.dot(bar);
+    source_.front().at_adjoint(ray.x, front_bar, coefficients_bar_.data());
+  }
   gradient.front += x_basis_.transpose() * coefficients_bar_ * y_basis_;
 }
 
@@ -330,7 +395,7 @@ double TwoFaceObjective::add_limits(const LensFaces& faces, LensFaces& gradient)
 
 ObjectiveEvaluation TwoFaceObjective::evaluate(const LensFaces& faces, LensFaces& gradient) {
   ObjectiveEvaluation result;
-  if (!find_rays(faces) || !measure_faces()) return result;
+  if (!find_rays(faces) || !measure_faces() || !measure_light_behind_front()) return result;
   gradient.exit.resize(3, faces.exit.cols());
   const double limits = add_limits(faces, gradient);
   std::fill(flux_bar_.begin(), flux_bar_.end(), 0.0);

@@ -42,6 +42,8 @@ HeightFront height_front(const Eigen::MatrixXd& samples, const Eigen::Vector2d& 
 struct FaceLimits {
   double thickness = 0.0;  ///< mm
   double weight = 1.0;     ///< Of all squared excesses in pixels of the first screen.
+  /// Height up to which the light behind the front must not fold, mm: above the exit face.
+  double unfolded_to = 0.0;
 };
 
 /// The error of the pictures that a lens of two free faces throws on one screen or two, as a
@@ -50,7 +52,8 @@ struct FaceLimits {
 /// derivatives by the front follow from the implicit function (front_adjoint()). A triangle's flux
 /// is its share of the light that enters between its corners' rays, so that the total is 1
 /// whatever the front. Barriers: total reflection at the exit face; small and folded triangles
-/// there and where the rays enter. On the CPU; same bits for any number of threads.
+/// there, where the rays enter, and where even rays through the front reach
+/// FaceLimits::unfolded_to. On the CPU; same bits for any number of threads.
 class TwoFaceObjective {
  public:
   /// @param net  shape of the control points. @param front  samples of the front.
@@ -71,6 +74,7 @@ class TwoFaceObjective {
 
   bool find_rays(const LensFaces& faces);
   bool measure_faces();
+  bool measure_light_behind_front();
   void pull_back_nodes(LensFaces& gradient);
   void add_entry_bars();
   void add_front_bars(LensFaces& gradient);
@@ -92,6 +96,14 @@ class TwoFaceObjective {
   std::shared_ptr<const HeightFront> shape_;  ///< A front of this many samples.
   LightSource source_;                        ///< Through a front of these coefficients.
   std::vector<std::unique_ptr<ScreenPart>> screens_;
+
+  // Even points of the front: their rays, where these land, and the derivatives by both.
+  SurfaceMesh even_;
+  MeshOn<Executor> even_topology_;
+  AreaBarrier even_area_;
+  std::vector<FrontRefraction> even_rays_;
+  Eigen::Matrix3Xd even_landing_;
+  std::vector<Corners> even_bar_;
 
   // Per node.
   Eigen::Matrix3Xd positions_, normals_;

@@ -21,6 +21,10 @@ constexpr int kFaceHalvings = 20;
 constexpr double kFaceHeightFloor = 0.5;
 constexpr double kFaceShiftFloor = 0.25;
 
+/// Curvature, as a share of the heights', below which shifts along the surface move no light: the
+/// surface is flat, and they are held.
+constexpr double kLeastBend = 1e-4;
+
 double lowest_of_grid(const GridShape& shape) {
   const double longest = std::max(shape.columns, shape.rows) - 1.0;
   return std::numbers::pi * std::numbers::pi / (longest * longest);
@@ -182,10 +186,16 @@ double TwoFaceStage::curvature(const Vector& x, Part part) {
 
 /// Scales every part to a preconditioned curvature of one along random directions.
 void TwoFaceStage::calibrate(const Vector& x) {
-  for (const Part part : {Part::kShifts, Part::kHeights, Part::kFront}) scale(part) = 1.0;
-  for (const Part part : {Part::kShifts, Part::kHeights, Part::kFront}) {
+  for (const Part part : {Part::kHeights, Part::kFront, Part::kShifts}) scale(part) = 1.0;
+  double heights = 0.0;
+  for (const Part part : {Part::kHeights, Part::kFront, Part::kShifts}) {
     const double bend = curvature(x, part);
-    if (bend > 0.0) scale(part) = 1.0 / bend;
+    if (part == Part::kHeights) heights = bend;
+    if (bend > kLeastBend * heights) {
+      scale(part) = 1.0 / bend;
+    } else {
+      scale(part) = 0.0;
+    }
   }
 }
 

@@ -55,7 +55,7 @@ class TwoFaces : public ::testing::Test {
 
   [[nodiscard]] TwoFaceObjective objective(const Executor& executor = Executor::serial()) const {
     // The thickness is above some nodes, so that its penalty acts.
-    return {sample_spline().shape, kFront, {near_, far_}, options_, {5.0, 1.0}, executor};
+    return {sample_spline().shape, kFront, {near_, far_}, options_, {5.0, 1.0, 40.0}, executor};
   }
 
   /// Error of the gradient along random directions of one face, against central differences.
