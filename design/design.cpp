@@ -24,6 +24,7 @@
 #include "design/schedule/checkpoint.h"
 #include "design/schedule/levels.h"
 #include "design/schedule/rounds.h"
+#include "design/schedule/two_faces.h"
 #include "design/spline/made_surface.h"
 #include "design/waves/wave_picture.h"
 
@@ -166,6 +167,44 @@ DesignResult run_to_end(const DesignTask& task, DesignLog& log, Checkpoint& stat
   return unfinished(task, std::move(state.mesh), executor);
 }
 
+/// The lens of shape_two_faces().
+Lens two_face_lens(const DesignTask& task, const Image& second, TwoFaceResult& shaped, Look look,
+                   const Executor& executor) {
+  Lens lens;
+  lens.model = SurfaceModel::kSpline;
+  lens.spline = {shaped.net, std::move(shaped.faces.exit)};
+  lens.surface = spline_nodes(*lens.spline, kMeshSamples).mesh;
+  lens.setup = task.setup;
+  lens.setup.front = height_front(shaped.faces.front, task.setup.lens_size);
+  lens.target = task.target;
+  Lens far = lens;
+  far.setup = on_second_screen(lens.setup);
+  far.target = second;
+  lens.second = {second, {}, {}};
+  lens.second->metrics = evaluate(far, lens.model, &lens.second->render, executor, look);
+  for (const SurfaceModel model : models_of(lens)) {
+    Image* const render = model == lens.model ? &lens.render : nullptr;
+    lens.metrics[model] = evaluate(lens, model, render, executor, look);
+  }
+  return lens;
+}
+
+/// A design of both faces. It has no checkpoint.
+DesignResult design_two_faces(const DesignTask& task, const Executor& executor) {
+  const Image second =
+      working_picture(*task.options.second.picture, task.options, {task.control.stop_token(), {}});
+  TwoFaceResult shaped = shape_two_faces(task, second);
+  DesignResult result;
+  if (shaped.done) result.status = DesignResult::Status::kDone;
+  result.message = shaped.done ? "both faces done" : "interrupted; --second cannot be resumed";
+  result.convergence = std::move(shaped.convergence);
+  task.control.report({"design", 1.0, 1.0, "rendering the lens"});
+  const Look look = shaped.done ? Look::kThorough : Look::kBrief;
+  result.lens = two_face_lens(task, second, shaped, look, executor);
+  result.fingerprint = design_fingerprint(task.target, task.options);
+  return result;
+}
+
 }  // namespace
 
 DesignResult::Made made_part(const Lens& lens, const MadeBy& process, const Executor& executor) {
@@ -204,6 +243,7 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   validate(options, target);
   const DesignOptions settled = with_smoothness_applied(options);
   const DesignTask task = make_task(target, settled, executor, control);
+  if (settled.second.picture) return design_two_faces(task, executor);
   Checkpoint state = first_state(task);
   if (settled.resume) require_surface(task, state);
   DesignLog log(task, state);

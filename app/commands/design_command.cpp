@@ -112,6 +112,7 @@ void describe(Description& d, DesignSettings& settings) {
   d.text("--out", settings.out, "DIR", "lens folder to write").needed = true;
   describe(d, settings.design);
   describe(d, settings.design.light);
+  describe(d, settings.design.second);
   d.text("--outline", settings.outline, "rectangle|circle|rounded:R|FILE",
          "edge of the lens: the largest circle, corners of radius R, or the shape that is white "
          "in a picture, seen from the cutter's side")
@@ -142,6 +143,26 @@ LoadedImage read_target(const DesignSettings& settings, const RunControl& contro
   if (is_svg(file)) require_wide_drawing(loaded.image, settings);
   return loaded;
 }
+
+namespace {
+
+/// Reads the picture of --second. @throw InputError; Interrupted.
+void read_second(DesignSettings& settings, const RunControl& control) {
+  SecondOptions& second = settings.design.second;
+  if (second.file.empty()) return;
+  if (!settings.live.empty()) {
+    throw InputError("--live " + settings.live + ": shows one picture; leave it out with --second");
+  }
+  if (settings.resume) {
+    throw InputError("--resume: a design with --second keeps no checkpoint; leave it out");
+  }
+  LoadedImage loaded =
+      read_image(second.file, control, settings.design.pixels, settings.background);
+  note_changes(settings, "--second " + second.file, loaded.changes);
+  second.picture = std::make_shared<const Image>(std::move(loaded.image));
+}
+
+}  // namespace
 
 void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
             const RunControl& control) {
@@ -180,6 +201,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
   note_changes(settings, "--source-picture " + light.source_picture,
                read_lamp(light, settings.background, control));
   if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
+  read_second(settings, control);
   if (!settings.outline.empty()) {
     OutlineChoice choice = outline_from(settings.outline, settings.background, control);
     note_changes(settings, "--outline " + settings.outline, choice.changes);
@@ -517,7 +539,7 @@ std::string summary_text(const fs::path& folder, const DesignSettings& settings,
                          const DesignResult& result) {
   const Lens& lens = result.lens;
   return folder.string() + ": " + result.message + "\n" +  //
-         metrics_text(lens) +                              //
+         metrics_text(lens) + second_text(lens) +          //
          (result.colors ? fringe_text(result.colors->fringe) : "") +
          (result.made
               ? "  made    " + metrics_text(result.made->metrics) + "\n" + made_words(settings)

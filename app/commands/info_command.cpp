@@ -234,6 +234,14 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
     d.line("screen", "tilted about its centre " + place_text(setup.screen_centre()) +
                          " mm, its normal " + place_text(setup.screen_x.cross(setup.screen_y)));
   }
+  if (setup.second) {
+    const OpticalSetup second = on_second_screen(setup);
+    d.line("second wall", "z = " + fixed(second.focal_length, 2) + " mm, picture " +
+                              fixed(second.image_size.x(), 2) + " x " +
+                              fixed(second.image_size.y(), 2) + " mm" +
+                              (second.screen_is_turned() ? ", tilted" : ""));
+    d.json["second"] = setup_json(setup).at("second");
+  }
   d.line("picture", size_text(setup.pixels.x(), setup.pixels.y()) + " pixels");
   d.json["lens_size"] = {setup.lens_size.x(), setup.lens_size.y()};
   d.json["image_size"] = {setup.image_size.x(), setup.image_size.y()};
@@ -268,6 +276,7 @@ Description describe_lens(const fs::path& folder) {
   describe_mesh(d, lens.surface);
   for (const auto& [model, metrics] : lens.metrics)
     d.line(model_name(model), metrics_text(metrics));
+  if (lens.second) d.line("second", metrics_text(lens.second->metrics));
   if (lens.source_limit) d.line("limit", metrics_text(*lens.source_limit) + "  of the source");
   d.json["metrics"] = metrics_json(lens);
   describe_provenance(d, lens.provenance.json());

@@ -43,6 +43,7 @@ struct RenderArguments {
   bool force = false;
   bool waves = false;
   double wavelength_nm = 550.0;
+  double at = 0.0;  ///< z of another unturned screen, mm; 0: those of the scene.
   RenderOptions render;
 };
 
@@ -54,6 +55,7 @@ struct Scene {
   std::optional<ControlNet> net;            ///< Likewise.
   RenderOptions render;
   std::optional<Image> target;
+  std::optional<SecondPicture> second;  ///< Of a lens for two pictures.
 };
 
 void describe(Description& d, RenderArguments& arguments) {
@@ -70,6 +72,9 @@ void describe(Description& d, RenderArguments& arguments) {
          "than √(λ f); takes seconds");
   d.number("--wavelength", arguments.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength),
            "nm", "of the wave; white light is as 550");
+  d.length("--at", arguments.at, Limits::zero_or(kMinThickness, kMaxFocalLength),
+           "the light at this z instead, without a target: between a lens's two screens its size "
+           "and place lie between theirs");
   describe(d, arguments.render);
 }
 
@@ -92,6 +97,7 @@ Scene load(const std::string& source, CommandFrame& frame) {
                 std::move(lens.target)};
     if (lens.spline) scene.spline = picture_nodes(*lens.spline);
     scene.net = std::move(lens.spline);
+    scene.second = std::move(lens.second);
     return scene;
   }
   SurfaceMesh mesh = read_mesh(source);
@@ -151,6 +157,40 @@ void put_lamp(const RenderArguments& arguments, CommandFrame& frame, RenderOptio
   put_lamp(light, render.setup);
 }
 
+/// The setup with its picture moved along the light to another z; its size and centre change
+/// evenly from the first screen to the second. The screen is not turned.
+OpticalSetup at_distance(OpticalSetup setup, double z) {
+  if (setup.second) {
+    const OpticalSetup far = on_second_screen(setup);
+    const double share = (z - setup.focal_length) / (far.focal_length - setup.focal_length);
+    setup.image_origin += share * (far.image_origin - setup.image_origin);
+    setup.image_size += share * (far.image_size - setup.image_size);
+    setup.second.reset();
+  }
+  setup.screen_x = Eigen::Vector3d::UnitX();
+  setup.screen_y = Eigen::Vector3d::UnitY();
+  setup.focal_length = z;
+  return setup;
+}
+
+/// Takes --at. @throw InputError if it does not fit the other options or the lens.
+void put_distance(const OptionSet& options, double z, Scene& scene) {
+  if (z == 0.0) return;
+  for (const char* other : {"--focal", "--target"}) {
+    if (options.given(other)) {
+      throw InputError(std::string("--at: cannot be given with ") + other + "; leave one out");
+    }
+  }
+  scene.render.setup = at_distance(scene.render.setup, z);
+  if (!(scene.render.setup.image_size.minCoeff() > 0.0)) {
+    throw InputError("--at " + number_text(z) +
+                     ": there the picture has no size left between those of the two screens; a z "
+                     "between them works");
+  }
+  scene.target.reset();
+  scene.second.reset();
+}
+
 /// The scene with everything that the options say instead.
 Scene adjusted(Scene scene, CommandFrame& frame, RenderArguments& arguments) {
   OptionSet& options = frame.options();
@@ -158,6 +198,7 @@ Scene adjusted(Scene scene, CommandFrame& frame, RenderArguments& arguments) {
   options.restate();
   scene.render = arguments.render;
   put_lamp(arguments, frame, scene.render);
+  put_distance(options, arguments.at, scene);
   if (scene.render.model == SurfaceModel::kSpline && !scene.spline) {
     throw InputError("--model spline: must be facet or smooth, since " + arguments.source +
                      " is no lens that was designed as a spline");
@@ -335,6 +376,26 @@ Rendering rendered(const Scene& scene, const Executor& executor) {
   return scene.target ? compare_models(scene, executor) : render_alone(scene, executor);
 }
 
+/// Adds the picture on a lens's second screen; its file is named after the first's.
+void add_second(const Scene& scene, const std::string& out, const Executor& executor,
+                CommandFrame& frame, Rendering& rendering) {
+  if (!scene.second || !scene.spline || scene.render.model != SurfaceModel::kSpline) return;
+  const OpticalSetup setup = on_second_screen(scene.render.setup);
+  const Image target = resample(scene.second->target, setup.pixels.x(), setup.pixels.y());
+  Image picture;
+  const ImageMetrics metrics =
+      evaluate(scene.spline->mesh, scene.spline->normals, setup, target, &picture, executor);
+  rendering.json["second"] = {{"metrics", metrics_json(metrics)}};
+  rendering.text += "  second  " + metrics_text(metrics) + "\n";
+  if (out.empty()) return;
+  const fs::path first(out);
+  const fs::path file =
+      first.parent_path() / (first.stem().string() + "_second" + first.extension().string());
+  require_replaceable("--out", file.string(), frame.options().given("--force"));
+  write_image(picture, file, frame.control());
+  rendering.json["second"]["out"] = file.string();
+}
+
 void require_picture_name(const std::string& out) {
   const std::string extension = fs::path(out).extension().string();
   if (!out.empty() && extension != ".png" && extension != ".exr") {
@@ -370,6 +431,7 @@ CommandResult run(CommandFrame& frame, RenderArguments& arguments) {
   Rendering rendering = rendered(scene, device.executor);
   if (arguments.waves) add_waves(scene, arguments.wavelength_nm, frame, rendering);
   if (!arguments.out.empty()) write_picture(rendering, scene, arguments.out, frame);
+  add_second(scene, arguments.out, device.executor, frame, rendering);
   rendering.json["device"] = device.word;
   rendering.json["source"] = arguments.source;
   rendering.json["model"] = model_name(scene.render.model);

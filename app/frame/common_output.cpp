@@ -42,6 +42,11 @@ std::string metrics_text(const Lens& lens) {
          "  of any surface, this source\n";
 }
 
+std::string second_text(const Lens& lens) {
+  if (!lens.second) return "";
+  return "  second  " + metrics_text(lens.second->metrics) + "\n";
+}
+
 std::string fringe_text(const Fringe& fringe) {
   return "  fringe  " + fixed(fringe.mean, 3) + " mm on average, at most " + fixed(fringe.max, 3) +
          " mm\n";

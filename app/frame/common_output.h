@@ -26,6 +26,9 @@ std::string metrics_text(const ModelMetrics& metrics);
 /// source, if it has one.
 std::string metrics_text(const Lens& lens);
 
+/// One line with the metrics of its second picture; nothing without one.
+std::string second_text(const Lens& lens);
+
 /// Formats a number with `digits` decimals.
 std::string fixed(double value, int digits);
 

@@ -24,6 +24,11 @@ inline constexpr const char* kTargetPng = "target.png";
 inline constexpr const char* kTargetExr = "target.exr";
 inline constexpr const char* kRenderPng = "render.png";
 inline constexpr const char* kRenderExr = "render.exr";
+/// For a lens with a second screen: the same of its picture there.
+inline constexpr const char* kSecondTargetPng = "target_second.png";
+inline constexpr const char* kSecondTargetExr = "target_second.exr";
+inline constexpr const char* kSecondRenderPng = "render_second.png";
+inline constexpr const char* kSecondRenderExr = "render_second.exr";
 inline constexpr const char* kRenderColor = "render_color.png";  ///< With a spectrum.
 inline constexpr const char* kWall = "wall.png";  ///< By waves, where the design followed them.
 inline constexpr const char* kError = "error.png";
@@ -33,9 +38,26 @@ inline constexpr const char* kSetup = "setup.svg";
 inline constexpr const char* kCheckpoint = "checkpoint.bin";  ///< While a design is unfinished.
 
 /// All of them.
-inline constexpr std::array kAll = {
-    kJson,      kSurface,     kSpline, kSheet, kFront,    kTargetPng, kTargetExr,   kRenderPng,
-    kRenderExr, kRenderColor, kWall,   kError, kOverview, kSetup,     kConvergence, kCheckpoint};
+inline constexpr std::array kAll = {kJson,
+                                    kSurface,
+                                    kSpline,
+                                    kSheet,
+                                    kFront,
+                                    kTargetPng,
+                                    kTargetExr,
+                                    kRenderPng,
+                                    kRenderExr,
+                                    kSecondTargetPng,
+                                    kSecondTargetExr,
+                                    kSecondRenderPng,
+                                    kSecondRenderExr,
+                                    kRenderColor,
+                                    kWall,
+                                    kError,
+                                    kOverview,
+                                    kSetup,
+                                    kConvergence,
+                                    kCheckpoint};
 
 /// Temporary folder of old versions, left behind if one was killed.
 inline constexpr const char* kStaging = "lens";

@@ -36,6 +36,7 @@ constexpr const char* kFormat = "lensforge.lens";
 constexpr int kVersion = 1;
 /// Key beside the metrics of the models.
 constexpr const char* kSourceLimit = "source_limit";
+constexpr const char* kSecond = "second";
 /// Maximum size of lens.json, which has about 2 kB.
 constexpr std::uintmax_t kMaxJsonBytes = std::uintmax_t{1} << 20U;
 
@@ -95,6 +96,14 @@ void add_files(const Lens& lens, PendingFiles& files) {
     add(kRenderExr, lens.render);
     add(kError, error_image(lens.render, lens.target));
   }
+  if (lens.second) {
+    add(kSecondTargetPng, lens.second->target);
+    add(kSecondTargetExr, lens.second->target);
+    if (!lens.second->render.empty()) {
+      add(kSecondRenderPng, lens.second->render);
+      add(kSecondRenderExr, lens.second->render);
+    }
+  }
   files.add(kJson, to_json(lens).dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
@@ -103,8 +112,9 @@ void add_files(const Lens& lens, PendingFiles& files) {
 void remove_older(const PendingFiles& files) {
   using namespace lens_file;
   fs::remove(files.folder() / kJson);
-  for (const char* name : {kSurface, kSpline, kSheet, kFront, kTargetPng, kTargetExr, kRenderPng,
-                           kRenderExr, kError}) {
+  for (const char* name :
+       {kSurface, kSpline, kSheet, kFront, kTargetPng, kTargetExr, kRenderPng, kRenderExr, kError,
+        kSecondTargetPng, kSecondTargetExr, kSecondRenderPng, kSecondRenderExr}) {
     if (!files.has(name)) fs::remove(files.folder() / name);
   }
 }
@@ -119,6 +129,7 @@ void check_sizes(const Lens& lens) {
   LF_CHECK(fits(lens.target), size_text(lens.target.columns(), lens.target.rows()));
   LF_CHECK(lens.render.empty() || fits(lens.render),
            size_text(lens.render.columns(), lens.render.rows()));
+  LF_CHECK(lens.second.has_value() == lens.setup.second.has_value(), "second picture");
 }
 
 json read_json(const fs::path& path) {
@@ -246,6 +257,13 @@ Image read_picture(const fs::path& path, const OpticalSetup& setup) {
   return image;
 }
 
+/// The same; an empty picture if there is no such file.
+Image read_picture_if_there(const fs::path& path, const OpticalSetup& setup) {
+  std::error_code none;
+  if (fs::status(path, none).type() == fs::file_type::not_found) return {};
+  return read_picture(path, setup);
+}
+
 }  // namespace
 
 ordered_json metrics_json(const ImageMetrics& metrics) { return json_of(description_of(metrics)); }
@@ -259,6 +277,7 @@ ordered_json metrics_json(const ModelMetrics& metrics) {
 ordered_json metrics_json(const Lens& lens) {
   ordered_json by_model = metrics_json(lens.metrics);
   if (lens.source_limit) by_model[kSourceLimit] = metrics_json(*lens.source_limit);
+  if (lens.second) by_model[kSecond] = metrics_json(lens.second->metrics);
   return by_model;
 }
 
@@ -330,10 +349,11 @@ Lens read_lens(const fs::path& folder) {
   lens.provenance = fields.at("provenance");
   read_surfaces(fields, folder, lens);
   lens.target = read_picture(folder / lens_file::kTargetExr, lens.setup);
-  const fs::path render = folder / lens_file::kRenderExr;
-  std::error_code none;
-  if (fs::status(render, none).type() != fs::file_type::not_found) {
-    lens.render = read_picture(render, lens.setup);
+  lens.render = read_picture_if_there(folder / lens_file::kRenderExr, lens.setup);
+  if (lens.setup.second) {
+    lens.second = {read_picture(folder / lens_file::kSecondTargetExr, lens.setup),
+                   read_picture_if_there(folder / lens_file::kSecondRenderExr, lens.setup),
+                   read_metrics(metrics.object(kSecond))};
   }
   return lens;
 }

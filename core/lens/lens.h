@@ -38,6 +38,13 @@ class Provenance {
   std::shared_ptr<const nlohmann::json> object_;
 };
 
+/// What a lens projects on its second screen.
+struct SecondPicture {
+  Image target;
+  Image render;  ///< Predicted picture under the lens's model; may be empty.
+  ImageMetrics metrics;
+};
+
 /// A designed lens, passed from command to command.
 struct Lens {
   /// The optical surface, z ≥ thickness; mm, lens frame. It fills the lens's rectangle even if
@@ -53,6 +60,7 @@ struct Lens {
   ModelMetrics metrics{{SurfaceModel::kFacet, {}}, {SurfaceModel::kSmooth, {}}};
   /// With an extended source: metrics of the best picture that any surface could make.
   std::optional<ImageMetrics> source_limit;
+  std::optional<SecondPicture> second;  ///< Where setup.second is.
   Provenance provenance;
 };
 

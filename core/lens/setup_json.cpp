@@ -210,6 +210,14 @@ void read_screen(const JsonFields& screen, OpticalSetup& setup) {
   setup.focal_length = screen.number_triple("centre").z();
 }
 
+SecondScreen read_second(const JsonFields& fields, OpticalSetup setup) {
+  read_screen(fields, setup);
+  SecondScreen second{
+      setup.focal_length, fields.number_pair("size"), {}, setup.screen_x, setup.screen_y};
+  second.image_origin = fields.number_triple("centre").head<2>() - 0.5 * second.image_size;
+  return second;
+}
+
 }  // namespace
 
 void require_agreement(const JsonFields& fields, const OpticalSetup& setup) {
@@ -244,6 +252,7 @@ ordered_json setup_json(const OpticalSetup& setup) {
   document["image_size"] = array_of(setup.image_size);
   document["image_origin"] = array_of(setup.image_origin);
   document["screen"] = screen_json(setup);
+  if (setup.second) document["second"] = screen_json(on_second_screen(setup));
   document["pixels"] = array_of(setup.pixels);
   document["view"] = setup.view == ViewSide::kFront ? "front" : "rear";
   return document;
@@ -278,6 +287,7 @@ OpticalSetup read_setup(const JsonFields& fields, const std::filesystem::path& f
   setup.view = word_in(fields, "view", named_views());
   if (fields.has("screen")) read_screen(fields.object("screen"), setup);
   if (!setup.screen_is_turned()) setup.focal_length = fields.number("focal_length");
+  if (fields.has("second")) setup.second = read_second(fields.object("second"), setup);
   return setup;
 }
 

@@ -220,6 +220,12 @@ void validate(const OpticalSetup& setup) {
   require_front(setup);
   require_outline(setup);
   require_spectrum(setup);
+  if (!setup.second) return;
+  try {
+    validate(on_second_screen(setup));
+  } catch (const InputError& error) {
+    throw InputError(std::string("second: ") + error.what());
+  }
 }
 
 std::vector<std::pair<std::string, ViewSide>> named_views() {
@@ -306,6 +312,17 @@ std::string lamp_words(const OpticalSetup& setup) {
 std::string place_words(const Eigen::Vector3d& p) {
   return joined(
       {"x ", page_number(p.x()), ", y ", page_number(p.y()), ", z ", page_number(p.z()), " mm"});
+}
+
+OpticalSetup on_second_screen(OpticalSetup setup) {
+  const SecondScreen screen = setup.second.value();
+  setup.focal_length = screen.focal_length;
+  setup.image_size = screen.image_size;
+  setup.image_origin = screen.image_origin;
+  setup.screen_x = screen.screen_x;
+  setup.screen_y = screen.screen_y;
+  setup.second.reset();
+  return setup;
 }
 
 OpticalSetup in_color(OpticalSetup setup, double wavelength) {

@@ -197,6 +197,18 @@ const BodyTraits& traits(const Body& body);
 /// Every kind by its word.
 std::vector<std::pair<std::string, Body>> named_bodies();
 
+/// The place of another picture of the same light, with as many pixels, seen from the same side.
+/// Fields as those of OpticalSetup.
+struct SecondScreen {
+  double focal_length = 0.0;
+  Eigen::Vector2d image_size{0.0, 0.0};
+  Eigen::Vector2d image_origin{0.0, 0.0};
+  Eigen::Vector3d screen_x{1.0, 0.0, 0.0};
+  Eigen::Vector3d screen_y{0.0, 1.0, 0.0};
+
+  friend bool operator==(const SecondScreen&, const SecondScreen&) = default;
+};
+
 /// Everything between the lamp and the wall except the surface itself. Millimetres, lens frame.
 /// LightPath derives the rays from it.
 ///
@@ -226,6 +238,7 @@ struct OpticalSetup {
   Eigen::Vector3d screen_y{0.0, 1.0, 0.0};   ///< The same for y; perpendicular to screen_x.
   Eigen::Vector2i pixels{256, 256};          ///< columns, rows of the working picture
   ViewSide view = ViewSide::kFront;
+  std::optional<SecondScreen> second;  ///< Of a lens for two pictures.
 
   [[nodiscard]] bool screen_is_turned() const {
     return screen_x != Eigen::Vector3d::UnitX() || screen_y != Eigen::Vector3d::UnitY();
@@ -251,6 +264,9 @@ std::string place_words(const Eigen::Vector3d& p);
 ///        map spans the lens's rectangle, an outline is one closed line inside that rectangle, and
 ///        everything is finite.
 void validate(const OpticalSetup& setup);
+
+/// The same setup with its second screen in place of the first, and no other. @pre setup.second.
+OpticalSetup on_second_screen(OpticalSetup setup);
 
 /// The setup for light of one wavelength; setup.ior is taken as the index at the d line.
 OpticalSetup in_color(OpticalSetup setup, double wavelength);

@@ -52,6 +52,13 @@ void append_light(const LightOptions& light, json& description) {
   }
 }
 
+void append_second(const SecondOptions& second, json& description) {
+  append_fingerprint(description_of(second), description);
+  Fnv1a hash;
+  hash.add(bytes_of(second.picture->values()));
+  description.push_back(hash.value());
+}
+
 void append_outline(const Outline& outline, json& description) {
   json points = json::array();
   for (const Eigen::Vector2d& p : outline.points) points.push_back({p.x(), p.y()});
@@ -95,6 +102,7 @@ std::uint64_t design_fingerprint(const Image& target, const DesignOptions& optio
   append_light(options.light, description);
   if (options.outline) append_outline(*options.outline, description);
   description.push_back(weights);
+  if (options.second.picture) append_second(options.second, description);
   if (options.made_by) {
     const MadeBy& made = *options.made_by;
     description.push_back(

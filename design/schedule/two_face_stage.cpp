@@ -81,8 +81,8 @@ TwoFaceStage::TwoFaceStage(const GridShape& net, const GridShape& front,
       lift_y_(at_greville_points(net.rows, front.rows)),
       objective_(net, front, goals, options, limits, executor),
       exit_preconditioner_(net, aspect_of(setup_.lens_size, net.columns - 1, net.rows - 1),
-                           objective_detail::movable_coordinates(
-                               even_points(net, setup_.lens_size), setup_.lens_size),
+                           objective_detail::movable_coordinates(even_points(net, setup_.lens_size),
+                                                                 setup_.lens_size),
                            executor),
       front_preconditioner_(front, aspect_of(setup_.lens_size, front.columns - 1, front.rows - 1),
                             heights_alone(front), executor) {
@@ -120,8 +120,7 @@ double TwoFaceStage::evaluate(std::span<const double> x, std::span<double> gradi
   exit = gradient_.exit;
   const Eigen::MatrixXd heights = gradient_.exit.row(2).reshaped(net_.columns, net_.rows);
   front.setZero();
-  front.row(2) =
-      (gradient_.front + lift_x_.transpose() * heights * lift_y_).reshaped().transpose();
+  front.row(2) = (gradient_.front + lift_x_.transpose() * heights * lift_y_).reshaped().transpose();
   return last_.energy.total;
 }
 
@@ -138,7 +137,8 @@ double& TwoFaceStage::scale(Part part) {
 
 /// Random signs in the variables of one part.
 TwoFaceStage::Vector TwoFaceStage::signs(Part part) const {
-  Vector signs(static_cast<std::size_t>(exit_size_ + Eigen::Index{3} * front_.columns * front_.rows), 0.0);
+  Vector signs(
+      static_cast<std::size_t>(exit_size_ + Eigen::Index{3} * front_.columns * front_.rows), 0.0);
   for (std::size_t i = 0; i < signs.size(); ++i) {
     const bool front = i >= static_cast<std::size_t>(exit_size_);
     const Part own = front ? Part::kFront : (i % 3 == 2 ? Part::kHeights : Part::kShifts);

@@ -23,6 +23,7 @@ void require(bool rule, const std::string& option, double value, const std::stri
 void require_all_in_range(const DesignOptions& o) {
   require_limits(o);
   require_limits(o.light);
+  require_limits(o.second);
   require_limits(o.weights);
   require(o.focal_length > o.thickness, "--focal", o.focal_length,
           "must be above the thickness of the lens, " + number_text(o.thickness) + " mm");
@@ -126,6 +127,7 @@ void validate(const DesignOptions& options, const Image& target) {
   if (!(target.total() > 0.0)) {
     throw InputError("the picture is all black: there is no light to place");
   }
+  require_second(options, target);
 }
 
 }  // namespace lensforge

@@ -85,6 +85,16 @@ inline constexpr int kMinPixels = 4;
 /// Maximum weight of a term of the objective: beyond it the others are lost to rounding.
 inline constexpr double kMaxWeight = 1e12;
 
+/// A second picture, of a lens of two free faces.
+struct SecondOptions {
+  std::string file;                      ///< As typed; empty: none.
+  std::shared_ptr<const Image> picture;  ///< Content of `file`.
+  double focal_length = 0.0;             ///< z of its screen, mm.
+  double width = 0.0;                    ///< Of the picture there, mm; 0: the first one's.
+  Eigen::Vector2d offset{0.0, 0.0};      ///< See LightOptions::image_offset.
+  Eigen::Vector2d tilt{0.0, 0.0};        ///< See LightOptions::screen_tilt.
+};
+
 /// Everything that shapes a design except the picture itself.
 struct DesignOptions {
   double width = 100.0;         ///< Lens width, mm; the height follows the picture.
@@ -93,6 +103,7 @@ struct DesignOptions {
   double ior = 1.49;            ///< Refractive index, > 1.
   double thickness = 5.0;       ///< Minimum z of the finished surface, mm, > 0.
   LightOptions light;           ///< Source, mirror or lens, screen.
+  SecondOptions second;         ///< With a picture, both faces are shaped.
   /// Edge of a lens that is not a rectangle: its kind and radius, mm, or the corners of a polygon
   /// in any unit. optical_setup() fits it into the lens's rectangle.
   std::optional<Outline> outline;
@@ -207,6 +218,15 @@ bool follows_waves(const DesignOptions& options, const OpticalSetup& setup);
 
 /// The waves of a design.
 WaveOptions wave_options(const DesignOptions& options, const OpticalSetup& setup);
+
+/// The least distance between two screens, as a share of that from z = 0 to the nearer: with less
+/// the light that leaves the lens would have to cross over on its way to the second.
+inline constexpr double kLeastScreenGap = 0.5;
+
+/// @throw InputError naming option, value and rule if the second picture does not fit the first or
+///        its screen the lens, or another option cannot be had with two free faces.
+/// @pre the other options are valid.
+void require_second(const DesignOptions& options, const Image& target);
 
 /// Width of the picture on the screen, mm: as stated, or the lens's.
 inline double picture_width(const DesignOptions& options) {

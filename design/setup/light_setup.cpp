@@ -26,6 +26,7 @@
 #include "core/text/number_text.h"
 #include "core/text/read_numbers.h"
 #include "core/text/words.h"
+#include "design/schedule/levels.h"
 #include "design/setup/design_options.h"
 
 namespace lensforge {
@@ -707,6 +708,25 @@ std::shared_ptr<const HeightSpline> front_from(const std::string& file, const Ru
   return std::make_shared<HeightSpline>(read_heights(file, control));
 }
 
+namespace {
+
+/// The first screen moved along the light of a flat surface's middle, with the size, offset and
+/// tilt of the second.
+SecondScreen second_screen(const DesignOptions& options, const OpticalSetup& first) {
+  const SecondOptions& second = options.second;
+  OpticalSetup setup = at_focal_length(first, second.focal_length, options.thickness);
+  const Eigen::Vector2d centre =
+      setup.screen_centre().head<2>() - options.light.image_offset + second.offset;
+  if (second.width > 0.0) setup.image_size *= second.width / setup.image_size.x();
+  setup.image_origin = centre - 0.5 * setup.image_size;
+  setup.screen_x = Eigen::Vector3d::UnitX();
+  setup.screen_y = Eigen::Vector3d::UnitY();
+  tilt_screen(second.tilt, setup);
+  return {setup.focal_length, setup.image_size, setup.image_origin, setup.screen_x, setup.screen_y};
+}
+
+}  // namespace
+
 OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& pixels) {
   OpticalSetup setup;
   setup.body = options.light.body;
@@ -740,6 +760,7 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   setup.image_origin =
       0.5 * (setup.lens_size - setup.image_size) + chief + options.light.image_offset;
   tilt_screen(options.light.screen_tilt, setup);
+  if (options.second.picture) setup.second = second_screen(options, setup);
   return setup;
 }
 
@@ -763,6 +784,91 @@ void require_light(const DesignOptions& options, const Eigen::Vector2i& pixels) 
   require_reach(options, setup);
   require_unshaded(options, pixels, setup);
   require_source_extent(options, setup);
+}
+
+namespace {
+
+/// Refuses what only a lens with one free face can have.
+void require_plain_lens(const DesignOptions& o) {
+  const std::pair<bool, const char*> faults[] = {
+      {!traits(o.light.body).transmits, "--mode: a mirror has one face; leave out --second"},
+      {o.light.front_radius || o.light.front_heights,
+       "--front: --second shapes the front itself; leave out --front"},
+      {o.model != SurfaceModel::kSpline, "--model: --second needs --model spline"},
+      {o.made_by.has_value(),
+       "--made-by: a process is known of one face only; leave it out with "
+       "--second"},
+      {o.light.model != LightModel::kRays, "--light-model: --second follows rays; leave it out"},
+      {!source_extent(o.light).none(),
+       "--source-angle, --source-size: --second needs light from a point or of one direction; "
+       "leave "
+       "out the width of the lamp"},
+      {!o.light.spectrum.none(), "--wavelengths: --second needs light of one colour; leave it out"},
+      {o.light.fresnel, "--fresnel: is not known of two free faces; leave it out with --second"},
+      {o.outline.has_value(),
+       "--outline: a lens of two free faces is a rectangle; leave it out "
+       "with --second"}};
+  for (const auto& [fault, words] : faults) {
+    if (fault) throw InputError(words);
+  }
+}
+
+void require_second_screen(const DesignOptions& o, const OpticalSetup& setup) {
+  const std::string given = "--second-focal " + number_text(o.second.focal_length);
+  const double nearer = std::min(o.focal_length, o.second.focal_length);
+  const double least = (1.0 + kLeastScreenGap) * nearer;
+  if (!(std::max(o.focal_length, o.second.focal_length) >= least)) {
+    refuse(given, "is too near to --focal " + number_text(o.focal_length) + "; " +
+                      number_text((1.0 + kLeastScreenGap) * o.focal_length) + "mm works");
+  }
+  const Eigen::Vector2d& tilt = o.second.tilt;
+  if (!(tilt.allFinite() && tilt_of(tilt) <= kMaxTilt)) {
+    refuse(
+        "--second-tilt " + text_of(tilt),
+        "must turn the screen by at most " + number_text(kMaxTilt) + " degrees in all; 0,0 works");
+  }
+  if (!(o.second.offset.cwiseAbs().maxCoeff() <= kMaxImageWidth)) {
+    refuse("--second-offset " + text_of(o.second.offset),
+           "must be at most " + number_text(kMaxImageWidth) + " mm; 0,0 works");
+  }
+  const OpticalSetup second = on_second_screen(setup);
+  const std::vector<double> clear = clearances(second, o.thickness);
+  if (!std::all_of(clear.begin(), clear.end(), [](double c) { return c > 0.0; }) ||
+      !reaches_centre(second, o.thickness)) {
+    refuse(given,
+           "the second screen is not in the light behind the lens; farther away, less "
+           "--second-tilt and --second-offset work");
+  }
+}
+
+}  // namespace
+
+void require_second(const DesignOptions& o, const Image& target) {
+  const SecondOptions& second = o.second;
+  if (!second.picture) {
+    if (second.file.empty() && second.focal_length > 0.0) {
+      refuse("--second-focal " + number_text(second.focal_length), "needs --second PICTURE");
+    }
+    return;
+  }
+  require_plain_lens(o);
+  if (second.focal_length == 0.0) {
+    refuse("--second " + second.file, "needs the place of its screen; --second-focal " +
+                                          number_text(3.0 * o.focal_length) + "mm works");
+  }
+  const Image& picture = *second.picture;
+  const int longer = std::max(picture.columns(), picture.rows());
+  const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), o.pixels);
+  if (longer < o.pixels || working_size(picture.columns(), picture.rows(), o.pixels) != pixels) {
+    refuse("--second " + second.file,
+           "is " + std::to_string(picture.columns()) + " x " + std::to_string(picture.rows()) +
+               " pixels; both pictures need the same proportions and at least --pixels " +
+               std::to_string(o.pixels) + " on the longer side");
+  }
+  if (!(picture.total() > 0.0)) {
+    refuse("--second " + second.file, "is black all over: there is no light to place");
+  }
+  require_second_screen(o, optical_setup(o, pixels));
 }
 
 }  // namespace lensforge

@@ -224,6 +224,20 @@ void describe(Description& d, LightOptions& o) {
            "of the wave, for --light-model; white light is as 550");
 }
 
+void describe(Description& d, SecondOptions& o) {
+  d.text("--second", o.file, "PICTURE",
+         "a second picture, which the same light makes on another screen: both faces of the lens "
+         "are shaped, and the thicker it is, the more the pictures may differ");
+  d.length("--second-focal", o.focal_length, Limits::zero_or(kMinThickness, kMaxFocalLength),
+           "z of the second picture's centre");
+  d.length("--second-width", o.width, Limits::zero_or(kMinImageWidth, kMaxImageWidth),
+           "width of the second picture; 0 takes the first one's");
+  describe_pair(d, "--second-offset", o.offset, "X,Y",
+                "mm that the second picture's centre is moved along x and y");
+  describe_pair(d, "--second-tilt", o.tilt, "AX,AY",
+                "degrees that the second screen is turned, as --screen-tilt turns the first");
+}
+
 void describe(Description& d, ObjectiveWeights& w) {
   constexpr int kDecimals = 9;
   const auto weight = [&d](const char* name, double& value, const std::string& help) {

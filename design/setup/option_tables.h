@@ -15,6 +15,9 @@ void describe(Description& d, DesignOptions& o);
 /// Options of light and screen. A fingerprint stores only those that differ from the default.
 void describe(Description& d, LightOptions& o);
 
+/// Options of a second picture and its screen.
+void describe(Description& d, SecondOptions& o);
+
 /// The weights, stored like a design's other options.
 void describe(Description& d, ObjectiveWeights& w);
 

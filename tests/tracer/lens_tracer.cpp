@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// lens_tracer FOLDER MODEL: what a lens projects, judged from its folder alone. It reads lens.json,
-// surface.ply, surface.spline, target.exr and front.exr as docs/interface.md describes them and
-// shares no code with the program. Facets are divided and traced point by point; of a smooth
-// surface the ray of every vertex is traced and its landing points are interpolated, as that page
-// says, of a spline that of many points in every knot cell.
+// lens_tracer FOLDER MODEL [second]: what a lens projects, judged from its folder alone. It reads
+// lens.json, surface.ply, surface.spline, target.exr and front.exr as docs/interface.md describes
+// them and shares no code with the program. Facets are divided and traced point by point; of a
+// smooth surface the ray of every vertex is traced and its landing points are interpolated, as that
+// page says, of a spline that of many points in every knot cell. `forward` follows even rays from
+// the front to a spline instead, wherever they meet it, so that light which has folded inside the
+// lens is seen. With `second` the picture is that on the second screen.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -48,6 +51,11 @@ struct Sample {
   Sample(const TracedLight& light, const Vec3& p, const Vec3& n) : ray(light.ray_to(p)) {
     if (ray) landing = light.landing(*ray, p, n);
   }
+  /// A ray that has met the surface at p.
+  Sample(const TracedLight& light, const Ray& met, const Vec3& p, const Vec3& n)
+      : ray(met), landing(light.landing(met, p, n)) {}
+  /// A ray that has not.
+  Sample() = default;
 };
 
 void add(const TracedLight& light, const Sample& a, const Sample& b, const Sample& c,
@@ -95,12 +103,123 @@ Traced trace(const TracedLight& light, const Mesh& mesh, const std::string& mode
   return traced;
 }
 
-void judge(const std::string& folder, const std::string& model) {
-  const TracedLight light(read_json(folder + "/lens.json"), folder);
-  const Picture target = read_picture(folder + "/target.exr");
-  const Mesh mesh = model == "spline" ? read_spline(folder + "/surface.spline")
-                                      : read_mesh(folder + "/surface.ply");
-  const PictureErrors errors = picture_errors(trace(light, mesh, model, target), target, 0);
+/// The triangles of a surface by where they lie over the lens.
+class TriangleMap {
+ public:
+  TriangleMap(const Mesh& mesh, const Vec2& size)
+      : mesh_(mesh), size_(size), cells_(kSide * kSide) {
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      Vec2 low = corner(t, 0);
+      Vec2 high = low;
+      for (const std::size_t k : {1U, 2U}) {
+        low = low.cwiseMin(corner(t, k));
+        high = high.cwiseMax(corner(t, k));
+      }
+      for (int j = place(low, 1); j <= place(high, 1); ++j) {
+        for (int i = place(low, 0); i <= place(high, 0); ++i) {
+          cells_[static_cast<std::size_t>(j * kSide + i)].push_back(t);
+        }
+      }
+    }
+  }
+
+  struct Hit {
+    Vec3 p;
+    Vec3 n;
+  };
+  /// The surface's point above a place and its normal there; none beside the surface.
+  [[nodiscard]] std::optional<Hit> above(const Vec2& at) const {
+    if (!(at.minCoeff() >= 0.0) || !((size_ - at).minCoeff() >= 0.0)) return std::nullopt;
+    constexpr double kEdge = -1e-9;
+    for (const std::size_t t :
+         cells_[static_cast<std::size_t>(place(at, 1) * kSide + place(at, 0))]) {
+      const Vec2 u = corner(t, 1) - corner(t, 0);
+      const Vec2 v = corner(t, 2) - corner(t, 0);
+      const Vec2 r = at - corner(t, 0);
+      const double area = u.x() * v.y() - u.y() * v.x();
+      const double b = (r.x() * v.y() - r.y() * v.x()) / area;
+      const double c = (u.x() * r.y() - u.y() * r.x()) / area;
+      if (!(b >= kEdge && c >= kEdge && 1.0 - b - c >= kEdge)) continue;
+      const auto mixed = [&](const std::vector<Vec3>& of) -> Vec3 {
+        return (1.0 - b - c) * of[index(t, 0)] + b * of[index(t, 1)] + c * of[index(t, 2)];
+      };
+      return Hit{mixed(mesh_.points), mixed(mesh_.normals).normalized()};
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static constexpr int kSide = 512;
+
+  [[nodiscard]] std::size_t index(std::size_t t, std::size_t k) const {
+    return static_cast<std::size_t>(mesh_.triangles[t][k]);
+  }
+  [[nodiscard]] Vec2 corner(std::size_t t, std::size_t k) const {
+    return mesh_.points[index(t, k)].head<2>();
+  }
+  [[nodiscard]] int place(const Vec2& at, int axis) const {
+    return std::clamp(static_cast<int>(kSide * at[axis] / size_[axis]), 0, kSide - 1);
+  }
+
+  const Mesh& mesh_;
+  Vec2 size_;
+  std::vector<std::vector<std::size_t>> cells_;
+};
+
+/// Follows a ray from the front until it meets the surface.
+std::optional<TriangleMap::Hit> met(const TriangleMap& surface, const Ray& ray) {
+  constexpr int kSteps = 60;
+  constexpr double kNear = 1e-10;  // mm
+  std::optional<TriangleMap::Hit> hit = surface.above(ray.from.head<2>());
+  for (int step = 0; hit && step < kSteps; ++step) {
+    const Vec3 at = ray.from + (hit->p.z() - ray.from.z()) / ray.way.z() * ray.way;
+    if ((at - hit->p).norm() < kNear) return hit;
+    hit = surface.above(at.head<2>());
+  }
+  return std::nullopt;
+}
+
+/// Even rays through the front, and the picture of the triangles between them.
+Traced trace_forward(const TracedLight& light, const Mesh& mesh, const nlohmann::json& lens,
+                     const Picture& target) {
+  constexpr int kRaysPerPixel = 12;  // Each way.
+  const Vec2 size(lens.at("lens_size").at(0).get<double>(),
+                  lens.at("lens_size").at(1).get<double>());
+  const TriangleMap surface(mesh, size);
+  const int columns = kRaysPerPixel * target.columns;
+  const int rows = kRaysPerPixel * target.rows;
+  std::vector<Sample> samples;
+  for (int j = 0; j <= rows; ++j) {
+    for (int i = 0; i <= columns; ++i) {
+      const std::optional<Ray> ray = light.ray_at({size.x() * i / columns, size.y() * j / rows});
+      const std::optional<TriangleMap::Hit> hit = ray ? met(surface, *ray) : std::nullopt;
+      samples.push_back(hit ? Sample(light, *ray, hit->p, hit->n) : Sample());
+    }
+  }
+  Traced traced{ClippedPicture(target.columns, target.rows)};
+  const auto at = [&](int i, int j) -> const Sample& {
+    return samples[static_cast<std::size_t>(j * (columns + 1) + i)];
+  };
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      add(light, at(i, j), at(i + 1, j), at(i + 1, j + 1), traced);
+      add(light, at(i, j), at(i + 1, j + 1), at(i, j + 1), traced);
+    }
+  }
+  return traced;
+}
+
+void judge(const std::string& folder, const std::string& model, bool second) {
+  nlohmann::json lens = read_json(folder + "/lens.json");
+  if (second) lens["screen"] = nlohmann::json(lens.at("second"));
+  const TracedLight light(lens, folder);
+  const Picture target = read_picture(folder + (second ? "/target_second.exr" : "/target.exr"));
+  const bool spline = model == "spline" || model == "forward";
+  const Mesh mesh =
+      spline ? read_spline(folder + "/surface.spline") : read_mesh(folder + "/surface.ply");
+  const Traced traced = model == "forward" ? trace_forward(light, mesh, lens, target)
+                                           : trace(light, mesh, model, target);
+  const PictureErrors errors = picture_errors(traced, target, 0);
   std::printf("{\"mae\": %.9g, \"mae_linear\": %.9g}\n", errors.mae, errors.linear);
 }
 
@@ -108,11 +227,12 @@ void judge(const std::string& folder, const std::string& model) {
 }  // namespace tracer
 
 int main(int argc, char** argv) try {
-  if (argc != 3) {
-    std::fprintf(stderr, "usage: lens_tracer FOLDER facet|smooth|spline\n");
+  const bool second = argc == 4 && std::string(argv[3]) == "second";
+  if (argc != 3 && !second) {
+    std::fprintf(stderr, "usage: lens_tracer FOLDER facet|smooth|spline|forward [second]\n");
     return 2;
   }
-  tracer::judge(argv[1], argv[2]);
+  tracer::judge(argv[1], argv[2], second);
   return 0;
 } catch (const std::exception& failure) {
   std::fprintf(stderr, "lens_tracer: %s\n", failure.what());

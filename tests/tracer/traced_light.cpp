@@ -81,14 +81,20 @@ std::optional<TracedLight::Front> TracedLight::front_at(const Vec2& place) const
   return Front{e, (middle - e) / radius_};
 }
 
-std::optional<Vec2> TracedLight::miss(const Vec2& entry, const Vec3& p, Ray& ray) const {
+std::optional<Ray> TracedLight::ray_at(const Vec2& entry) const {
   const std::optional<Front> front = front_at(entry);
   if (!front) return std::nullopt;
   const Vec3 before = source_ ? Vec3((front->place - *source_).normalized()) : direction_;
   const std::optional<Vec3> way = refracted(before, front->normal, 1.0 / ior_);
   if (!way || !(way->z() > 0.0)) return std::nullopt;
-  ray = {front->place, *way};
-  const Vec3 at = ray.from + (p.z() - ray.from.z()) / way->z() * *way;
+  return Ray{front->place, *way};
+}
+
+std::optional<Vec2> TracedLight::miss(const Vec2& entry, const Vec3& p, Ray& ray) const {
+  const std::optional<Ray> there = ray_at(entry);
+  if (!there) return std::nullopt;
+  ray = *there;
+  const Vec3 at = ray.from + (p.z() - ray.from.z()) / ray.way.z() * ray.way;
   return at.head<2>() - p.head<2>();
 }
 

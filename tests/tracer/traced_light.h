@@ -23,6 +23,9 @@ class TracedLight {
   /// @throw std::runtime_error if the file tells of something that is not followed.
   TracedLight(const nlohmann::json& lens, const std::string& folder);
 
+  /// The ray that enters a lens above this place; none where no light enters.
+  [[nodiscard]] std::optional<Ray> ray_at(const Vec2& entry) const;
+
   /// The ray to a point of the surface; none where no light comes to it.
   [[nodiscard]] std::optional<Ray> ray_to(const Vec3& p) const;
 

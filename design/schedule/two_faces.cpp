@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "design/schedule/two_faces.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include "core/error.h"
+#include "core/spline/control_net.h"
+#include "core/text/number_text.h"
+#include "design/render.h"
+#include "design/schedule/face_transport.h"
+#include "design/schedule/two_face_stage.h"
+
+namespace lensforge {
+namespace {
+
+/// Longer side of the coarsest pictures, about.
+constexpr double kCoarsestSide = 16.0;
+
+/// Steps of the coarsest pictures' contrast.
+constexpr int kContrastSteps = 6;
+
+/// Knot cells of the exit face and samples of the front, per pixel side.
+constexpr double kCellsPerPixel = 1.0;
+
+/// Iterations of a stage, in DesignOptions::iterations: its pictures are small, and it starts
+/// without transport. Each stage measures its steps anew in this many rounds.
+constexpr int kStageIterations = 4;
+constexpr int kStageRounds = 2;
+constexpr int kPairs = 20;
+
+/// Room beyond the thickness for the relief of either face, as a share of it, and height up to
+/// which the light behind the front must not fold.
+constexpr double kRoom = 0.12;
+constexpr double kUnfolded = 1.4;
+
+/// FaceLimits::weight: light enters within a hundredth of a pixel of the lens's edges.
+constexpr double kLimitWeight = 100.0;
+
+/// Steps in which faces that a finer stage's barriers refuse are flattened.
+constexpr int kFlatteningSteps = 50;
+
+using Clock = std::chrono::steady_clock;
+
+/// Coefficients of a spline with `from` knot cells as those of one with `to`, exact if the knots
+/// are nested.
+Eigen::MatrixXd refinement(int from, int to) {
+  std::vector<double> fine;
+  std::vector<double> coarse;
+  for (int i = 0; i < to + kSplineDegree; ++i) {
+    fine.push_back(greville_point(i, to));
+    coarse.push_back(fine.back() * from / to);
+  }
+  const Eigen::MatrixXd values(basis_matrix(fine, to, false));
+  return values.partialPivLu().solve(Eigen::MatrixXd(basis_matrix(coarse, from, false)));
+}
+
+/// Values of a front of `from` samples at `to` samples.
+Eigen::MatrixXd resampling(int from, int to) {
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(to, from + 2 * HeightSpline::kBeyond);
+  for (int k = 0; k < to; ++k) {
+    const SplineWeights weights((from - 1.0) * k / (to - 1.0), from);
+    for (int i = 0; i < 4; ++i) values(k, weights.first + i) += weights.value[i];
+  }
+  return values * HeightSpline::coefficient_matrix(from);
+}
+
+/// One picture size and contrast.
+struct Stage {
+  Eigen::Vector2i pixels;
+  double contrast;  ///< Share of the targets; the rest is the plane lens's light.
+};
+
+std::vector<Stage> plan_stages(const Eigen::Vector2i& pixels) {
+  const int halvings =
+      std::max(0, static_cast<int>(std::lround(std::log2(pixels.maxCoeff() / kCoarsestSide))));
+  const auto at = [&](int l) -> Eigen::Vector2i {
+    const double scale = std::ldexp(1.0, l - halvings);
+    return (scale * pixels.cast<double>()).array().round().max(kMinPixels).cast<int>();
+  };
+  std::vector<Stage> stages;
+  for (int k = 1; k < kContrastSteps; ++k) {
+    stages.push_back({at(0), static_cast<double>(k) / kContrastSteps});
+  }
+  for (int l = 0; l <= halvings; ++l) stages.push_back({at(l), 1.0});
+  return stages;
+}
+
+/// The faces and their shapes.
+struct Shaped {
+  LensFaces faces;
+  GridShape net;
+  GridShape front;
+};
+
+class TwoFaceDesign {
+ public:
+  TwoFaceDesign(const DesignTask& task, const Image& second)
+      : task_(task), second_(second), stages_(plan_stages(task.setup.pixels)) {}
+
+  TwoFaceResult run() {
+    try {
+      for (index_ = 0; index_ < stages_.size(); ++index_) run_stage(stages_[index_]);
+      result_.done = true;
+    } catch (const Interrupted&) {
+    }
+    result_.net = here_.net;
+    result_.faces = rested(std::move(here_));
+    return std::move(result_);
+  }
+
+ private:
+  void run_stage(const Stage& stage) {
+    refine(stage);
+    const std::vector<ScreenGoal> goals = goals_of(stage);
+    ObjectiveOptions options;
+    options.weights = task_.options.weights;
+    options.model = SurfaceModel::kSpline;
+    options.samples = kMeshSamples;
+    options.weights.smooth = 0.0;
+    const double cells = (here_.net.columns - 3.0) * (here_.net.rows - 3.0);
+    options.area = default_area_barrier(
+        goals.front().setup, static_cast<std::int64_t>(2.0 * kMeshSamples * kMeshSamples * cells));
+    const double thickness = task_.options.thickness;
+    TwoFaceStage descent(here_.net, here_.front, goals, options,
+                         {thickness, kLimitWeight, kUnfolded * thickness}, task_.executor);
+    flatten_if_refused(descent);
+    LbfgsOptions optimizer;
+    optimizer.max_iterations = kStageIterations * task_.options.iterations;
+    optimizer.history = kPairs;
+    for (round_ = 0; round_ < kStageRounds; ++round_) {
+      const LbfgsSummary summary = descent.run(
+          optimizer,
+          [&](int iteration, const ObjectiveEvaluation& e) { return note(iteration, e); },
+          here_.faces);
+      if (summary.status == LbfgsSummary::Status::kStopped) throw Interrupted();
+    }
+  }
+
+  /// Takes the faces to the shapes of a stage; at first they are planes.
+  void refine(const Stage& stage) {
+    const Eigen::Vector2d cells = (kCellsPerPixel * stage.pixels.cast<double>()).array().round();
+    const auto columns = static_cast<int>(cells.x());
+    const auto rows = static_cast<int>(cells.y());
+    const GridShape net{columns + kSplineDegree, rows + kSplineDegree};
+    const GridShape front{columns + 1, rows + 1};
+    if (here_.net == net) return;
+    LensFaces finer;
+    if (!here_.net.is_grid()) {
+      finer = plane_faces(net, front);
+    } else {
+      const Eigen::MatrixXd u = refinement(here_.net.columns - 3, columns);
+      const Eigen::MatrixXd v = refinement(here_.net.rows - 3, rows);
+      finer.exit.resize(3, Eigen::Index{net.columns} * net.rows);
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::MatrixXd table =
+            here_.faces.exit.row(k).reshaped(here_.net.columns, here_.net.rows);
+        finer.exit.row(k) = (u * table * v.transpose()).reshaped().transpose();
+      }
+      finer.front = resampling(here_.front.columns, front.columns) * here_.faces.front *
+                    resampling(here_.front.rows, front.rows).transpose();
+    }
+    here_ = {std::move(finer), net, front};
+    hold_rim();
+  }
+
+  [[nodiscard]] LensFaces plane_faces(const GridShape& net, const GridShape& front) const {
+    const Eigen::Vector2d& size = task_.setup.lens_size;
+    const double room = kRoom * task_.options.thickness;
+    LensFaces planes{Eigen::Matrix3Xd(3, Eigen::Index{net.columns} * net.rows),
+                     Eigen::MatrixXd::Constant(front.columns, front.rows, -room)};
+    for (int j = 0; j < net.rows; ++j) {
+      for (int i = 0; i < net.columns; ++i) {
+        planes.exit.col(Eigen::Index{j} * net.columns + i)
+            << size.x() * greville_point(i, net.columns - 3) / (net.columns - 3),
+            size.y() * greville_point(j, net.rows - 3) / (net.rows - 3),
+            task_.options.thickness + room;
+      }
+    }
+    return planes;
+  }
+
+  /// Puts the exit face's rim exactly on the lens's rectangle.
+  void hold_rim() {
+    const LensFaces planes = plane_faces(here_.net, here_.front);
+    for (int k = 0; k < 2; ++k) {
+      const double far = task_.setup.lens_size[k];
+      for (Eigen::Index i = 0; i < planes.exit.cols(); ++i) {
+        const double even = planes.exit(k, i);
+        if (even == 0.0 || even == far) here_.faces.exit(k, i) = even;
+      }
+    }
+  }
+
+  [[nodiscard]] std::vector<ScreenGoal> goals_of(const Stage& stage) const {
+    std::vector<ScreenGoal> goals{{task_.setup, task_.target},
+                                  {on_second_screen(task_.setup), second_}};
+    for (ScreenGoal& goal : goals) {
+      goal.setup.second.reset();
+      goal.setup.pixels = stage.pixels;
+      goal.target = resample(goal.target, stage.pixels.x(), stage.pixels.y());
+      if (stage.contrast < 1.0) mix_with_plane(stage.contrast, goal);
+    }
+    return goals;
+  }
+
+  /// Mixes a target with the light of a lens of plane faces.
+  void mix_with_plane(double contrast, ScreenGoal& goal) const {
+    const SurfaceMesh plane =
+        make_grid_mesh(goal.setup.lens_size, {goal.setup.pixels.x() + 1, goal.setup.pixels.y() + 1},
+                       (1.0 + kRoom) * task_.options.thickness);
+    const std::vector<double> light =
+        flux_of_surface(plane, goal.setup, SurfaceModel::kSmooth, task_.executor);
+    const double total = goal.target.total();
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      float& value = goal.target.values()[i];
+      value = static_cast<float>(contrast * static_cast<double>(value) +
+                                 (1.0 - contrast) * total * light[i]);
+    }
+  }
+
+  /// Moves faces that a stage refuses towards planes.
+  void flatten_if_refused(TwoFaceStage& descent) {
+    const LensFaces planes = plane_faces(here_.net, here_.front);
+    const LensFaces refused = here_.faces;
+    for (int step = 0; step <= kFlatteningSteps; ++step) {
+      const double share = static_cast<double>(step) / kFlatteningSteps;
+      here_.faces.exit = (1.0 - share) * refused.exit + share * planes.exit;
+      here_.faces.front = (1.0 - share) * refused.front + share * planes.front;
+      if (!descent.errors(here_.faces).empty()) return;
+    }
+    throw InputError(
+        "--second: the light of a lens with plane faces misses a screen; "
+        "--second-tilt 0,0 works");
+  }
+
+  /// Records an iteration; false if the design is to stop.
+  bool note(int iteration, const ObjectiveEvaluation& e) {
+    ConvergenceRow row;
+    row.stage = "spline";
+    row.level = static_cast<int>(index_);
+    row.round = round_;
+    row.iteration = iteration;
+    row.energy = e.energy;
+    row.mae = e.mae;
+    row.seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    result_.convergence.push_back(row);
+    char detail[64];
+    std::snprintf(detail, sizeof(detail), "MAE %.4f", e.mae);
+    const double rounds =
+        round_ + double{1} * iteration / (kStageIterations * task_.options.iterations);
+    task_.control.report(
+        {"design, stage " + std::to_string(index_ + 1) + " of " + std::to_string(stages_.size()),
+         work(index_) + rounds / kStageRounds * (work(index_ + 1) - work(index_)),
+         work(stages_.size()), detail});
+    return !task_.control.stop_requested();
+  }
+
+  /// Pixels of all stages before this one.
+  [[nodiscard]] double work(std::size_t stage) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < stage; ++k) sum += stages_[k].pixels.cast<double>().prod();
+    return sum;
+  }
+
+  /// The faces within their limits, which the descent's penalties keep to a few micrometres.
+  [[nodiscard]] LensFaces rested(Shaped shaped) const {
+    LensFaces faces = std::move(shaped.faces);
+    const ControlNet net{shaped.net, faces.exit};
+    const double lowest = spline_nodes(net, kMeshSamples).mesh.vertices.row(2).minCoeff();
+    faces.exit = settled(net, std::max(lowest, task_.options.thickness)).points;
+    const double high = std::max(0.0, faces.front.maxCoeff());
+    faces.front.array() -= high;
+    return faces;
+  }
+
+  const DesignTask& task_;
+  const Image& second_;
+  std::vector<Stage> stages_;
+  Clock::time_point start_ = Clock::now();
+  std::size_t index_ = 0;
+  int round_ = 0;
+  Shaped here_;
+  TwoFaceResult result_;
+};
+
+}  // namespace
+
+TwoFaceResult shape_two_faces(const DesignTask& task, const Image& second) {
+  return TwoFaceDesign(task, second).run();
+}
+
+}  // namespace lensforge
