@@ -212,9 +212,12 @@ void read_screen(const JsonFields& screen, OpticalSetup& setup) {
 
 SecondScreen read_second(const JsonFields& fields, OpticalSetup setup) {
   read_screen(fields, setup);
-  SecondScreen second{
-      setup.focal_length, fields.number_pair("size"), {}, setup.screen_x, setup.screen_y};
-  second.image_origin = fields.number_triple("centre").head<2>() - 0.5 * second.image_size;
+  const SecondScreen second{setup.focal_length, fields.number_pair("size"),
+                            fields.number_pair("image_origin"), setup.screen_x, setup.screen_y};
+  const Eigen::Vector2d centre = second.image_origin + 0.5 * second.image_size;
+  if (!((fields.number_triple("centre").head<2>() - centre).norm() <= kAgreement)) {
+    fields.refuse("centre", "the picture's centre by image_origin and size is somewhere else");
+  }
   return second;
 }
 
@@ -252,7 +255,10 @@ ordered_json setup_json(const OpticalSetup& setup) {
   document["image_size"] = array_of(setup.image_size);
   document["image_origin"] = array_of(setup.image_origin);
   document["screen"] = screen_json(setup);
-  if (setup.second) document["second"] = screen_json(on_second_screen(setup));
+  if (setup.second) {
+    ordered_json& second = document["second"] = screen_json(on_second_screen(setup));
+    second["image_origin"] = array_of(setup.second->image_origin);
+  }
   document["pixels"] = array_of(setup.pixels);
   document["view"] = setup.view == ViewSide::kFront ? "front" : "rear";
   return document;

@@ -197,6 +197,32 @@ TEST(SetupJson, AnExtentThatCannotBeIsRefusedWithItsField) {
   EXPECT_THAT(refusal("/source/shape", json::parse("[[0, 0]]")), HasSubstr("source.shape"));
 }
 
+TEST(SetupJson, ASecondScreenComesBackToTheBitAndIsLeftOutWhereThereIsNone) {
+  OpticalSetup setup;
+  EXPECT_FALSE(setup_json(setup).contains("second"));
+  setup.second = {731.3, {80.1, 53.7}, {-4.7, 13.13}, {0.8, 0.0, -0.6}, {0.0, 1.0, 0.0}};
+  for (const ViewSide view : {ViewSide::kFront, ViewSide::kRear}) {
+    setup.view = view;
+    EXPECT_EQ(written_and_read(setup), setup);
+  }
+  const OpticalSetup there = on_second_screen(setup);
+  EXPECT_EQ(there.focal_length, 731.3);
+  EXPECT_FALSE(there.second);
+}
+
+TEST(SetupJson, ASecondScreenThatCannotBeIsRefusedWithItsField) {
+  OpticalSetup setup;
+  setup.second = {731.3, {80.0, 50.0}, {10.0, 25.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}};
+  const auto refusal_of = [&](const char* key, const json& value) {
+    json document = json::parse(setup_json(setup).dump());
+    document["second"][key] = value;
+    return message_of<InputError>([&] { validate(read_setup(JsonFields(document, "lens.json"))); });
+  };
+  EXPECT_THAT(refusal_of("centre", {0, 0, 731.3}), HasSubstr("somewhere else"));
+  EXPECT_THAT(refusal_of("centre", {50.0, 50.0, -3}), HasSubstr("second: focal_length -3"));
+  EXPECT_THAT(refusal_of("up", {0, 0, 2}), HasSubstr("second: "));
+}
+
 TEST(SetupJson, ATiltedScreenHasNoFocalLength) {
   OpticalSetup setup;
   EXPECT_TRUE(setup_json(setup).contains("focal_length"));

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/image/image_io.h"
+#include "scenario/driver.h"
+
+namespace lensforge::scenario {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A design of both faces for two small pictures, some seconds of work.
+Arguments two_pictures(const std::string& out, const Arguments& more = {}) {
+  Arguments arguments{"design",
+                      picture("rings.png"),
+                      "--second",
+                      picture("relief.png"),
+                      "--pixels",
+                      "16",
+                      "--width",
+                      "12mm",
+                      "--thickness",
+                      "12mm",
+                      "--quality",
+                      "draft",
+                      "--quiet",
+                      "--out",
+                      out};
+  // A later option wins over an earlier one only in another place: defaults are left out.
+  const auto given = [&](const std::string& name) {
+    return std::find(more.begin(), more.end(), name) != more.end();
+  };
+  if (!given("--focal")) arguments.insert(arguments.end(), {"--focal", "30mm"});
+  if (!given("--second-focal")) arguments.insert(arguments.end(), {"--second-focal", "120mm"});
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+nlohmann::json tracer_finds(const std::string& folder, const std::string& how) {
+  return json_printed_by(std::string(LENSFORGE_TRACER) + " '" + folder + "' " + how);
+}
+
+class TwoFaces : public Scenario {};
+
+TEST_F(TwoFaces, ProjectBothPicturesAsAnIndependentTraceFromTheFrontFinds) {
+  const Outcome made = run(two_pictures(path("lens"), {"--json"}));
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const nlohmann::json metrics = made.json()["metrics"];
+  const std::pair<std::string, std::string> pictures[] = {{"spline", ""}, {"second", " second"}};
+  for (const auto& [key, where] : pictures) {
+    const double error = metrics[key]["mae"].get<double>();
+    EXPECT_LT(error, 0.06) << key;
+    for (const std::string how : {"spline", "forward"}) {
+      EXPECT_NEAR(tracer_finds(path("lens"), how + where)["mae"].get<double>(), error, 2e-3)
+          << key << ' ' << how;
+    }
+  }
+  const nlohmann::json lens = nlohmann::json::parse(content(at("lens/lens.json")));
+  EXPECT_EQ(lens["front"]["type"], "heights");
+  EXPECT_EQ(lens["second"]["centre"], nlohmann::json({6.0, 6.0, 120.0}));
+
+  // The folder is read back: both pictures, and any between.
+  const Outcome again = run({"render", path("lens"), "--json", "--out", path("again.exr")});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_NEAR(again.json()["second"]["metrics"]["mae"].get<double>(),
+              metrics["second"]["mae"].get<double>(), 1e-9);
+  EXPECT_EQ(read_image(at("again_second.exr")).image,
+            read_image(at("lens/render_second.exr")).image);
+  const Outcome between = run({"render", path("lens"), "--at", "60mm", "--json"});
+  ASSERT_EQ(between.exit_code, 0) << between.err;
+  EXPECT_GT(between.json()["flux_inside"].get<double>(), 0.8);
+  EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr("second wall   z = 120.00 mm"));
+}
+
+TEST_F(TwoFaces, WhatTheyCannotHaveIsRefusedInOneLine) {
+  const std::pair<Arguments, std::vector<std::string>> faults[] = {
+      {{"--second-focal", "0"}, {"--second ", "--second-focal 90mm works"}},
+      {{"--second-focal", "35mm"}, {"--second-focal 35", "too near to --focal 30", "45mm works"}},
+      {{"--second-focal", "5mm"}, {"--second-focal 5", "not in the light behind the lens"}},
+      {{"--mode", "reflect", "--incidence", "30"}, {"--mode", "--second"}},
+      {{"--front", "sphere:100"}, {"--front", "--second shapes the front itself"}},
+      {{"--model", "facet"}, {"--model", "--second needs --model spline"}},
+      {{"--made-by", "default"}, {"--made-by", "--second"}},
+      {{"--light-model", "waves"}, {"--light-model", "--second"}},
+      {{"--lamp", "sun"}, {"--source-angle", "--second"}},
+      {{"--wavelengths", "450,550,650"}, {"--wavelengths", "--second"}},
+      {{"--fresnel"}, {"--fresnel", "--second"}},
+      {{"--outline", "circle"}, {"--outline", "--second"}},
+      {{"--resume"}, {"--resume", "--second"}},
+      {{"--second-tilt", "85,0"}, {"--second-tilt 85", "0,0 works"}}};
+  for (const auto& [options, words] : faults) {
+    expect_refusal(run(two_pictures(path("lens"), options)), 2, words);
+    EXPECT_FALSE(fs::exists(at("lens/lens.json"))) << options.front();
+  }
+  const Outcome alone = run({"design", picture("rings.png"), "--second-focal", "90mm", "--pixels",
+                             "16", "--out", path("lens")});
+  expect_refusal(alone, 2, {"--second-focal 90", "needs --second PICTURE"});
+  const Outcome other = run({"design", picture("rings.png"), "--second", picture("text.png"),
+                             "--second-focal", "900mm", "--out", path("lens")});
+  expect_refusal(other, 2, {"--second ", "same proportions"});
+}
+
+}  // namespace
+}  // namespace lensforge::scenario
