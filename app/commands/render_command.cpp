@@ -55,7 +55,7 @@ struct Scene {
   std::optional<ControlNet> net;            ///< Likewise.
   RenderOptions render;
   std::optional<Image> target;
-  std::optional<SecondPicture> second;  ///< Of a lens for two pictures.
+  std::optional<SecondPicture> second = {};  ///< Of a lens for two pictures.
 };
 
 void describe(Description& d, RenderArguments& arguments) {
