@@ -212,8 +212,8 @@ void read_screen(const JsonFields& screen, OpticalSetup& setup) {
 
 SecondScreen read_second(const JsonFields& fields, OpticalSetup setup) {
   read_screen(fields, setup);
-  const SecondScreen second{setup.focal_length, fields.number_pair("size"),
-                            fields.number_pair("image_origin"), setup.screen_x, setup.screen_y};
+  SecondScreen second{setup.focal_length, fields.number_pair("size"),
+                      fields.number_pair("image_origin"), setup.screen_x, setup.screen_y};
   const Eigen::Vector2d centre = second.image_origin + 0.5 * second.image_size;
   if (!((fields.number_triple("centre").head<2>() - centre).norm() <= kAgreement)) {
     fields.refuse("centre", "the picture's centre by image_origin and size is somewhere else");

@@ -331,21 +331,70 @@ inline constexpr double kNearEntry = 1e-9;
 inline constexpr double kTinyEntry = 1e-12;
 inline constexpr int kMaxEntrySteps = 30;
 
+/// The ray from a source through a front to a point p behind it, by Newton's method on x + (p_z −
+/// h(x)) m(x) = p_xy from a place `x` that a neighbouring ray has. Steps into folded light are
+/// halved. All NaN if none is found.
+LF_HD inline IncidentRay ray_from_near(const FrontSurface& front, const FrontLight& light,
+                                       const Eigen::Vector3d& p, Eigen::Vector2d x) {
+  Eigen::Vector2d step(0.0, 0.0);
+  for (int i = 0; i < kMaxEntrySteps; ++i) {
+    FrontRefraction ray(front, light, x);
+    const Eigen::Matrix2d lands = ray.landing_by_x(p.z());
+    const double det = lands(0, 0) * lands(1, 1) - lands(0, 1) * lands(1, 0);
+    if (!ray.lit || !(ray.b.z() > 0.0) || !(det > 0.0)) {
+      if (step.x() == 0.0 && step.y() == 0.0) break;
+      step *= 0.5;
+      x += step;
+      continue;
+    }
+    Eigen::Matrix2d inverse;
+    inverse << lands(1, 1), -lands(0, 1), -lands(1, 0), lands(0, 0);
+    inverse /= det;
+    step = inverse * (x + (p.z() - ray.e.z()) * ray.slope() - Eigen::Vector2d(p.x(), p.y()));
+    if (step.norm() <= kNearEntry * (p.cwiseAbs().sum() + std::fabs(ray.e.z())) + kTinyEntry) {
+      ray.move(-step);
+      return ray.ray(inverse);
+    }
+    x -= step;
+  }
+  return FrontRefraction().ray(Eigen::Matrix2d::Identity());
+}
+
+/// Heights in which a point rises from a front to its own, where Newton's method from its own place
+/// fails: the light near the front has not gathered yet.
+inline constexpr int kEntryRises = 8;
+
+/// The same without a neighbour. @pre a height map.
+LF_HD inline IncidentRay raised_ray(const FrontSurface& front, const FrontLight& light,
+                                    const Eigen::Vector3d& p) {
+  IncidentRay ray = FrontRefraction().ray(Eigen::Matrix2d::Identity());
+  ray.x = Eigen::Vector2d(p.x(), p.y());
+  const double low = front.height(ray.x);
+  for (int k = 1; k <= kEntryRises; ++k) {
+    const double z = low + (p.z() - low) * k / kEntryRises;
+    ray = ray_from_near(front, light, {p.x(), p.y(), z}, ray.x);
+    if (!(ray.a_z > 0.0)) break;
+  }
+  return ray;
+}
+
 /// The ray from a source through a curved front to a point p behind it: Newton's method on x + (p_z
-/// − h(x)) m(x) = p_xy. All NaN if no ray reaches p. @param x  where to start.
+/// − h(x)) m(x) = p_xy from p's own place; if that fails behind a height map, raised_ray(). All NaN
+/// if no ray reaches p.
 LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const FrontLight& light,
-                                           const Eigen::Vector3d& p, Eigen::Vector2d x) {
+                                           const Eigen::Vector3d& p) {
   IncidentRay found = FrontRefraction().ray(Eigen::Matrix2d::Identity());
+  Eigen::Vector2d x(p.x(), p.y());
   if (!front.covers(x)) return found;
   for (int i = 0; i < kMaxEntrySteps; ++i) {
     FrontRefraction ray(front, light, x);
-    if (!ray.lit || !(ray.b.z() > 0.0)) return found;
+    if (!ray.lit || !(ray.b.z() > 0.0)) break;
     const Eigen::Vector2d m = ray.slope();
     const double rise = p.z() - ray.e.z();
     const Eigen::Matrix2d lands = ray.landing_by_x(p.z());
     // Beyond where neighbouring rays meet, the light has folded over.
     const double det = lands(0, 0) * lands(1, 1) - lands(0, 1) * lands(1, 0);
-    if (!(det > 0.0)) return found;
+    if (!(det > 0.0)) break;
     Eigen::Matrix2d inverse;
     inverse << lands(1, 1), -lands(0, 1), -lands(1, 0), lands(0, 0);
     inverse /= det;
@@ -357,11 +406,7 @@ LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const Fron
     for (int k = 0; k < kMaxEntrySteps && !front.covers(x - step); ++k) step *= 0.5;
     x -= step;
   }
-  return found;
-}
-LF_HD inline IncidentRay ray_through_front(const FrontSurface& front, const FrontLight& light,
-                                           const Eigen::Vector3d& p) {
-  return ray_through_front(front, light, p, {p.x(), p.y()});
+  return front.is_height_map() ? raised_ray(front, light, p) : found;
 }
 
 /// The light before the surface: its direction at a point, and the amount that a triangle takes in.

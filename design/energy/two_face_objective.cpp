@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "design/energy/two_face_objective.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -141,11 +140,6 @@ constexpr int kCellsBeyond = 1;
 /// Weight of their barrier, in ObjectiveWeights::barrier: so that a descent turns before it.
 constexpr double kFoldWeight = 1e5;
 
-/// Newton's steps to a ray.
-constexpr int kMaxRaySteps = 60;
-/// Heights in which a point rises to its own.
-constexpr int kRises = 8;
-
 SurfaceMesh even_mesh(const Eigen::Vector2d& size, const GridShape& front) {
   const Eigen::Vector2d cells(front.columns - 1, front.rows - 1);
   const Eigen::Vector2d beyond = kCellsBeyond * size.cwiseQuotient(cells);
@@ -156,46 +150,6 @@ SurfaceMesh even_mesh(const Eigen::Vector2d& size, const GridShape& front) {
       make_grid_mesh(size + 2.0 * beyond, {points(front.columns), points(front.rows)}, 0.0);
   mesh.vertices.topRows<2>().colwise() -= beyond;
   return mesh;
-}
-
-/// The ray through the front to p by Newton's method from x, as ray_through_front(), but steps into
-/// folded light are halved. All NaN if none is found.
-IncidentRay damped_ray(const FrontSurface& front, const FrontLight& light, const Eigen::Vector3d& p,
-                       Eigen::Vector2d x) {
-  Eigen::Vector2d step(0.0, 0.0);
-  for (int i = 0; i < kMaxRaySteps; ++i) {
-    FrontRefraction ray(front, light, x);
-    const Eigen::Matrix2d lands = ray.landing_by_x(p.z());
-    if (!ray.lit || !(ray.b.z() > 0.0) || !(lands.determinant() > 0.0)) {
-      if (step.isZero()) break;
-      step *= 0.5;
-      x += step;
-      continue;
-    }
-    const Eigen::Matrix2d inverse = lands.inverse();
-    step = inverse * (x + (p.z() - ray.e.z()) * ray.slope() - p.head<2>());
-    if (step.norm() <= kNearEntry * (p.cwiseAbs().sum() + std::fabs(ray.e.z())) + kTinyEntry) {
-      ray.move(-step);
-      return ray.ray(inverse);
-    }
-    x -= step;
-  }
-  return FrontRefraction().ray(Eigen::Matrix2d::Identity());
-}
-
-/// The same without a place to start from: the point rises to p from the front, where the light has
-/// not gathered yet.
-IncidentRay raised_ray(const FrontSurface& front, const FrontLight& light,
-                       const Eigen::Vector3d& p) {
-  const double low = front.height(p.head<2>());
-  IncidentRay ray;
-  ray.x = p.head<2>();
-  for (int k = 1; k <= kRises; ++k) {
-    const double z = low + (p.z() - low) * k / kRises;
-    ray = damped_ray(front, light, {p.x(), p.y(), z}, ray.x);
-    if (!ray.m.allFinite()) break;
-  }
-  return ray;
 }
 
 /// Value of the area barrier of a triangle; sets the derivatives by its corners.
@@ -291,8 +245,8 @@ bool TwoFaceObjective::find_rays(const LensFaces& faces) {
     IncidentRay& ray = rays_[static_cast<std::size_t>(v)];
     const FrontLight light = source_.before_front();
     const Eigen::Vector2d last = ray.x;
-    if (last.allFinite()) ray = damped_ray(source_.front(), light, p, last);
-    if (!ray.m.allFinite()) ray = raised_ray(source_.front(), light, p);
+    if (last.allFinite()) ray = ray_from_near(source_.front(), light, p, last);
+    if (!ray.m.allFinite()) ray = ray_through_front(source_.front(), light, p);
     if (!ray.m.allFinite()) {
       ray.x = last;
       return {1.0, 0.0};

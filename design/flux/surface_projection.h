@@ -177,8 +177,8 @@ struct LandRay {
   }
 };
 
-/// Smooth model: image triangle of a triangle; without flux if a corner does not transmit or its
-/// flux is negative.
+/// Smooth model: image triangle of a triangle; without flux if a corner does not transmit, or its
+/// flux is negative or no number.
 struct ProjectSmooth {
   SurfaceView surface;
   const double* landing;  ///< 2 × V
@@ -193,7 +193,7 @@ struct ProjectSmooth {
                               column2(landing, v[2]),
                               surface.light.flux(surface.corners(i), surface.incident.at(v))};
     const bool lit = is_finite(image.p0) && is_finite(image.p1) && is_finite(image.p2);
-    return lit && !(image.flux < 0.0) ? image : ImageTriangle{};
+    return lit && image.flux >= 0.0 ? image : ImageTriangle{};
   }
 };
 
