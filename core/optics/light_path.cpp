@@ -151,6 +151,9 @@ class TriangleIntakes {
   std::vector<IncidentRay> rays_;  ///< By vertex; empty for parallel light.
 };
 
+/// The intake of a triangle; 0 where no ray reaches a corner, whose light is in no picture either.
+double lit(double intake) { return std::isnan(intake) ? 0.0 : intake; }
+
 }  // namespace
 
 double intake_inside(const SurfaceMesh& mesh, const MeshCut& cut, const LightPath& light) {
@@ -158,7 +161,7 @@ double intake_inside(const SurfaceMesh& mesh, const MeshCut& cut, const LightPat
   double sum = 0.0;
   for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) {
     const double share = cut.share[static_cast<std::size_t>(t)];
-    if (share > 0.0) sum += share * intakes.at(t);
+    if (share > 0.0) sum += share * lit(intakes.at(t));
   }
   return sum;
 }
@@ -166,7 +169,7 @@ double intake_inside(const SurfaceMesh& mesh, const MeshCut& cut, const LightPat
 double intake_of(const SurfaceMesh& mesh, const LightPath& light) {
   const TriangleIntakes intakes(mesh, light);
   double sum = 0.0;
-  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) sum += intakes.at(t);
+  for (std::int64_t t = 0; t < mesh.triangle_count(); ++t) sum += lit(intakes.at(t));
   return sum;
 }
 

@@ -55,7 +55,8 @@ class TwoFaces : public ::testing::Test {
 
   [[nodiscard]] TwoFaceObjective objective(const Executor& executor = Executor::serial()) const {
     // The thickness is above some nodes, so that its penalty acts.
-    return {sample_spline().shape, kFront, {near_, far_}, options_, {5.0, 1.0, 40.0}, executor};
+    return {sample_spline().shape,    kFront,  {near_, far_}, options_,
+            {5.0, 1.0, unfolded_to_}, executor};
   }
 
   /// Error of the gradient along random directions of one face, against central differences.
@@ -81,6 +82,7 @@ class TwoFaces : public ::testing::Test {
     EXPECT_LE(testing::slope_error(value, start, computed, direction), 1e-6) << front;
   }
 
+  double unfolded_to_ = 8.0;
   ScreenGoal near_;
   ScreenGoal far_;
   LensFaces faces_;
@@ -96,6 +98,22 @@ TEST_F(TwoFaces, GradientsEqualCentralDifferencesForEveryLamp) {
     light_by(lamp);
     for (const bool front : {true, false}) expect_slopes(front);
   }
+}
+
+TEST_F(TwoFaces, LightThatGathersBelowTheHeightGivenIsPenalised) {
+  LensFaces ignored;
+  const double low = objective().evaluate(faces_, ignored).energy.barrier;
+  // The greatest height up to which it does not fold.
+  double high = low;
+  for (ObjectiveEvaluation next = objective().evaluate(faces_, ignored); next.feasible;
+       next = objective().evaluate(faces_, ignored)) {
+    high = next.energy.barrier;
+    unfolded_to_ += 0.05;
+  }
+  unfolded_to_ -= 0.05;
+  EXPECT_GT(high, low + 1.0);
+  EXPECT_LT(unfolded_to_, 40.0);
+  for (const bool front : {true, false}) expect_slopes(front);
 }
 
 TEST_F(TwoFaces, PicturesAreThoseThatTheRendererMakes) {
