@@ -28,7 +28,6 @@ namespace lensforge {
 namespace {
 
 constexpr int kMaxSteps = 200;
-constexpr double kSlightest = 1e-14;  ///< Share of the sum that counts as no progress: rounding.
 constexpr double kFirstDamping = 1e-3;
 constexpr double kMaxDamping = 1e10;  ///< Steps are then shorter than the differences.
 constexpr double kEasing = 10.0;
@@ -78,6 +77,7 @@ Eigen::VectorXd step_of(const LeastSquares& problem, const Eigen::MatrixXd& jaco
 }  // namespace
 
 Eigen::MatrixXd LeastSquares::jacobian(const Eigen::VectorXd& parameters) const {
+  if (derivatives) return derivatives(parameters)(Eigen::all, free);
   Eigen::MatrixXd columns;
   for (std::size_t i = 0; i < free.size(); ++i) {
     Eigen::VectorXd moved = parameters;
@@ -113,7 +113,7 @@ Eigen::VectorXd minimize(const LeastSquares& problem, Eigen::VectorXd start) {
       damping /= kEasing;
       break;
     }
-    if (before - residuals.squaredNorm() <= kSlightest * before) break;
+    if (before - residuals.squaredNorm() <= problem.least_gain * before) break;
   }
   return at;
 }

@@ -16,11 +16,14 @@ namespace lensforge {
 /// A weighted least-squares problem in a few parameters: minimise |r(p)|².
 struct LeastSquares {
   std::function<Eigen::VectorXd(const Eigen::VectorXd& parameters)> residuals;
-  std::vector<int> free;    ///< Parameters that may change; the others keep their value.
-  Eigen::VectorXd steps;    ///< Of differences, one per parameter, > 0.
-  Eigen::VectorXd longest;  ///< Maximum change of a parameter in one step.
+  /// ∂r/∂p of all parameters where it is known; else differences.
+  std::function<Eigen::MatrixXd(const Eigen::VectorXd& parameters)> derivatives = {};
+  std::vector<int> free;      ///< Parameters that may change; the others keep their value.
+  Eigen::VectorXd steps;      ///< Of differences, one per parameter, > 0.
+  Eigen::VectorXd longest;    ///< Maximum change of a parameter in one step.
+  double least_gain = 1e-14;  ///< Share of the sum that counts as no progress; rounding.
 
-  /// ∂r/∂p of the free parameters, by central differences.
+  /// ∂r/∂p of the free parameters: the known one, or by central differences.
   [[nodiscard]] Eigen::MatrixXd jacobian(const Eigen::VectorXd& parameters) const;
 };
 
@@ -35,8 +38,8 @@ struct FitQuality {
   Eigen::VectorXd deletion;
 };
 
-/// Minimises from `start` by Levenberg-Marquardt steps (Marquardt 1963) until none lowers the sum
-/// by a part in 1e14.
+/// Minimises from `start` by Levenberg-Marquardt steps (Marquardt 1963) until one lowers the sum
+/// by no more than the least gain.
 Eigen::VectorXd minimize(const LeastSquares& problem, Eigen::VectorXd start);
 
 FitQuality fit_quality(const LeastSquares& problem, const Eigen::VectorXd& minimum);
