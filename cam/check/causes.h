@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "cam/check/wall_model.h"
+#include "cam/check/wall_view.h"
+#include "core/compute/executor.h"
+
+namespace lensforge {
+
+/// One deviation that explains a part of what a photograph shows.
+struct FoundCause {
+  Deviation deviation;
+  double value = 0.0;  ///< In the unit of Deviation.
+  double error = 0.0;  ///< Standard.
+  /// By how much the photograph is likelier with it: N ln of the ratio of the sums of squared
+  /// residuals of the fits without and with it.
+  double evidence = 0.0;
+  /// Deviations that would explain the same nearly as well in its place.
+  std::vector<Deviation> alternatives;
+};
+
+/// What one photograph tells of a lens.
+struct CauseFit {
+  Eigen::VectorXd view;           ///< With the causes.
+  Deviations deviations;          ///< 0 but for the causes.
+  std::vector<FoundCause> found;  ///< Most evidence first; none: nothing is wrong that shows.
+  Deviations errors;         ///< Standard error of every deviation if it alone were added; 0 if
+                             ///< it does not show.
+  double residual = 0.0;     ///< Root mean square of display values.
+  double unexplained = 0.0;  ///< The same without any cause.
+};
+
+/// Finds the causes one after the other: the deviation with the most evidence, less what speaks
+/// against so large a one beforehand (prior_of()), is fitted together with those before it and the
+/// view, by Gauss-Newton steps over pictures that are predicted anew, until no further one has
+/// kEvidence. A cause that lost its evidence to later ones is dropped.
+/// @param view  find_picture()'s. @throw Interrupted
+CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
+                     const RunControl& control);
+
+/// Standard deviation with which a deviation occurs, about; of what a workshop's tolerances state,
+/// theirs would be too small: a photograph is checked because something is wrong.
+Deviations prior_of(const WallModel& model);
+
+/// A predicted picture of the model for a view.
+WallPicture wall_picture(const WallModel& model, const Deviations& deviations);
+
+}  // namespace lensforge

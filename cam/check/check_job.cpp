@@ -1,0 +1,506 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/check/check_job.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <utility>
+
+#include "cam/plan/finishing.h"
+#include "core/image/color.h"
+#include "core/image/image_io.h"
+#include "core/io/files.h"
+#include "core/optics/picture_blur.h"
+#include "core/optics/polish_transfer.h"
+#include "core/page/html_page.h"
+#include "core/text/number_text.h"
+#include "core/text/version.h"
+#include "core/text/words.h"
+
+namespace lensforge {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Pixels of the photograph per pixel of the lens's picture that a fit compares: finer ones add
+/// nothing, since the picture has no finer detail.
+constexpr double kSeenPerPixel = 1.5;
+constexpr int kFine = 3;        ///< Twice that: SeenPixels::shown().
+constexpr double kReach = 1.2;  ///< Of the wall that is compared.
+
+/// Pixel coordinates at which a photograph shows a place on the wall: Newton's steps.
+class WallToPhoto {
+ public:
+  WallToPhoto(const Photograph& photo, Eigen::VectorXd view)
+      : half_(0.5 * Eigen::Vector2d(photo.light.columns(), photo.light.rows())),
+        view_(std::move(view)) {}
+
+  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& wall) {
+    constexpr double kStep = 1e-5;
+    constexpr int kSteps = 12;
+    for (int k = 0; k < kSteps; ++k) {
+      const Eigen::Vector2d off = wall_of(view_, last_) - wall;
+      Eigen::Matrix2d slope;
+      for (int axis = 0; axis < 2; ++axis) {
+        const Eigen::Vector2d moved = last_ + kStep * Eigen::Vector2d::Unit(axis);
+        slope.col(axis) = (wall_of(view_, moved) - wall - off) / kStep;
+      }
+      const Eigen::Vector2d step = slope.partialPivLu().solve(off);
+      last_ -= step;
+      if (step.norm() < 1e-9) break;
+    }
+    return half_ + last_ * half_.norm();
+  }
+
+  /// Light of the wall's picture from that of the photograph at pixel coordinates.
+  [[nodiscard]] double light(const Eigen::Vector2d& pixel, double seen) const {
+    return wall_light(view_, (pixel - half_) / half_.norm(), seen);
+  }
+
+ private:
+  Eigen::Vector2d half_;
+  Eigen::VectorXd view_;
+  Eigen::Vector2d last_{0.0, 0.0};
+};
+
+/// The picture as seen straight on: the mean of places of every pixel.
+Image rectified(const Photograph& photo, const Eigen::VectorXd& view, const Image& target) {
+  constexpr int kParts = 3;
+  Image picture(target.columns(), target.rows());
+  const double even = target.total() / (1.0 * target.columns() * target.rows());
+  WallToPhoto seen(photo, view);
+  for (int r = 0; r < picture.rows(); ++r) {
+    for (int c = 0; c < picture.columns(); ++c) {
+      double sum = 0.0;
+      for (int k = 0; k < kParts * kParts; ++k) {
+        const Eigen::Vector2d wall(
+            2.0 * (c + (k % kParts + 0.5) / kParts) / picture.columns() - 1.0,
+            2.0 * (r + (k / kParts + 0.5) / kParts) / picture.rows() - 1.0);
+        const Eigen::Vector2d pixel = seen.at(wall);
+        sum += seen.light(pixel, bilinear(photo.light, pixel));
+      }
+      picture.at(c, r) = static_cast<float>(std::max(even * sum / (kParts * kParts), 0.0));
+    }
+  }
+  return picture;
+}
+
+double clipped_share(const Photograph& photo, const Eigen::VectorXd& view, const Image& target) {
+  WallToPhoto seen(photo, view);
+  double clipped = 0.0;
+  for (int r = 0; r < target.rows(); ++r) {
+    for (int c = 0; c < target.columns(); ++c) {
+      const Eigen::Vector2d pixel = seen.at(
+          {2.0 * (c + 0.5) / target.columns() - 1.0, 2.0 * (r + 0.5) / target.rows() - 1.0});
+      const int column = std::clamp(static_cast<int>(pixel.x()), 0, photo.light.columns() - 1);
+      const int row = std::clamp(static_cast<int>(pixel.y()), 0, photo.light.rows() - 1);
+      clipped += photo.is_usable(column, row) ? 0.0 : 1.0;
+    }
+  }
+  return clipped / (1.0 * target.columns() * target.rows());
+}
+
+Image blurred(const Image& image, double deviation, const Executor& executor) {
+  if (deviation == 0.0) return image;
+  const std::vector<double> light(image.values().begin(), image.values().end());
+  const Eigen::Vector2i pixels(image.columns(), image.rows());
+  Haze all;
+  all.share = 1.0;
+  all.deviation = {deviation, deviation};
+  const std::vector<double> even(light.size(), 1.0);
+  const std::vector<double> sum = hazed(all, light, pixels, executor);
+  const std::vector<double> inside = hazed(all, even, pixels, executor);
+  Image result(image.columns(), image.rows());
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    result.values()[i] = static_cast<float>(sum[i] / inside[i]);
+  }
+  return result;
+}
+
+/// Golden section over the blur's deviation.
+Likeness likeness(const Image& seen, const Image& other, const Executor& executor) {
+  constexpr double kMostBlur = 6.0;  // Pixels.
+  constexpr int kSteps = 16;
+  const auto mae = [&](double blur) { return compare(seen, blurred(other, blur, executor)).mae; };
+  Likeness result;
+  result.metrics = compare(seen, other);
+  double low = 0.0;
+  double high = kMostBlur;
+  for (int k = 0; k < kSteps; ++k) {
+    const double part = (high - low) / (1.0 + std::numbers::phi);
+    if (mae(low + part) < mae(high - part)) {
+      high -= part;
+    } else {
+      low += part;
+    }
+  }
+  const double best = 0.5 * (low + high);
+  if (mae(best) < result.metrics.mae) result.blur = best;
+  result.blurred = compare(seen, blurred(other, result.blur, executor));
+  return result;
+}
+
+std::string plus_minus(double value, double error, const std::string& unit) {
+  return number_text(value, 3) + " ± " + number_text(error, 1) + unit;
+}
+
+}  // namespace
+
+bool is_name_of_check(const std::string& name) {
+  return std::find(kCheckFiles.begin(), kCheckFiles.end(), name) != kCheckFiles.end();
+}
+
+CheckResult check_photograph(const Lens& lens, const CamOptions& options, const Photograph& photo,
+                             const Executor& executor, const RunControl& control) {
+  const WallModel model(lens, options, kFine, executor, control);
+  const WallPicture forecast = wall_picture(model, Deviations::Zero());
+  const Eigen::VectorXd found = find_picture(photo, forecast);
+  CheckResult result;
+  result.part = model.has_part();
+  result.fault = model.fault();
+  result.seen_pixels = pixels_across(photo, found);
+  const Photograph less =
+      shrunk(photo, result.seen_pixels / (kSeenPerPixel * lens.setup.pixels.x()));
+  result.fit = find_causes(model, SeenPixels(less, found, kReach), found, control);
+  result.rectified = rectified(less, result.fit.view, lens.target);
+  result.unusable = clipped_share(photo, result.fit.view, lens.target);
+  const int margin = forecast.margin;
+  Image inside(forecast.light.columns() - 2 * margin, forecast.light.rows() - 2 * margin);
+  const double even = lens.target.total() / lens.setup.pixels.cast<double>().prod();
+  for (int r = 0; r < inside.rows(); ++r) {
+    for (int c = 0; c < inside.columns(); ++c) {
+      inside.at(c, r) = static_cast<float>(even * forecast.light.at(c + margin, r + margin));
+    }
+  }
+  result.forecast = resample(inside, lens.target.columns(), lens.target.rows());
+  result.to_target = likeness(result.rectified, lens.target, executor);
+  result.to_forecast = likeness(result.rectified, result.forecast, executor);
+  return result;
+}
+
+namespace {
+
+/// A deviation's name in JSON, and in words.
+struct DeviationName {
+  const char* key;
+  const char* words;
+};
+
+DeviationName name_of(Deviation deviation) {
+  constexpr std::array<DeviationName, kDeviations> kNames = {{
+      {"distance", "the wall's distance"},
+      {"tilt_x", "the wall's tilt about its horizontal axis"},
+      {"tilt_y", "the wall's tilt about its vertical axis"},
+      {"lamp_size", "the lamp's size"},
+      {"lamp_distance", "the lamp's distance"},
+      {"index", "the refractive index"},
+      {"polish_sigma", "the polish"},
+      {"ball_radius", "the finishing ball"},
+      {"pitch_error", "the pitch error"},
+      {"haze", "haze"},
+  }};
+  return kNames[static_cast<std::size_t>(deviation)];
+}
+
+/// A deviation in the unit that people measure it in.
+struct Measured {
+  double value = 0.0;
+  double error = 0.0;
+  double nominal = 0.0;  ///< As planned.
+  std::string unit;
+};
+
+Measured measured(Deviation deviation, double value, double error, const Lens& lens,
+                  const CamOptions& options) {
+  const OpticalSetup& setup = lens.setup;
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  switch (deviation) {
+    case Deviation::kDistance:
+      return {wall_distance(setup) * (1.0 + value), wall_distance(setup) * error,
+              wall_distance(setup), " mm"};
+    case Deviation::kTiltX:
+    case Deviation::kTiltY:
+      return {kDegrees * value, kDegrees * error, 0.0, "°"};
+    case Deviation::kLampSize: {
+      const double nominal = lamp_angle(setup);
+      const double angle = std::sqrt(std::max(nominal * nominal + value, 0.0));
+      return {1e3 * angle, 1e3 * error / std::max(2.0 * angle, std::sqrt(error)), 1e3 * nominal,
+              " mrad"};
+    }
+    case Deviation::kLampDistance: {
+      const auto lamp = lamp_distance(setup);
+      const double vergence = lamp ? 1.0 / *lamp : 0.0;
+      const double now = vergence + value / wall_distance(setup);
+      return {1.0 / now, error / wall_distance(setup) / (now * now), 1.0 / vergence, " mm"};
+    }
+    case Deviation::kIndex:
+      return {1.0 + (setup.ior - 1.0) * (1.0 + value), (setup.ior - 1.0) * error, setup.ior, ""};
+    case Deviation::kPolish: {
+      const double sigma = 1e3 * options.workshop.polish.sigma;
+      return {sigma * std::exp(value), sigma * std::exp(value) * error, sigma, " µm"};
+    }
+    case Deviation::kBall: {
+      const double radius = finishing_ball(options).radius();
+      return {radius * (1.0 + value), radius * error, radius, " mm"};
+    }
+    case Deviation::kPitch: {
+      const double nominal = 100.0 * options.workshop.process.finish.pitch_error;
+      return {nominal + 100.0 * value, 100.0 * error, nominal, " %"};
+    }
+    case Deviation::kHaze:
+      break;
+  }
+  return {100.0 * value, 100.0 * error, 0.0, " %"};
+}
+
+}  // namespace
+
+std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions& options) {
+  const Measured m = measured(cause.deviation, cause.value, cause.error, lens, options);
+  const bool more = m.value > m.nominal;
+  const std::string now = plus_minus(m.value, m.error, m.unit);
+  const std::string off = plus_minus(std::abs(m.value - m.nominal), m.error, m.unit);
+  const std::string planned = " instead of " + number_text(m.nominal, 3) + m.unit;
+  switch (cause.deviation) {
+    case Deviation::kDistance:
+      return "the wall is " + off + (more ? " too far: move it nearer" : " too near: move it away");
+    case Deviation::kTiltX:
+      return "the wall is tilted by " + off + " about its horizontal axis: move its " +
+             (m.value > 0.0 ? "lower" : "upper") + " edge nearer";
+    case Deviation::kTiltY:
+      return "the wall is tilted by " + off +
+             " about its vertical axis: turn it parallel to the "
+             "lens";
+    case Deviation::kLampSize:
+      return "the lamp is " + now + " wide" + planned + ": use a " +
+             (more ? "smaller or farther" : "larger or nearer") + " one, or design for it";
+    case Deviation::kLampDistance:
+      return "the lamp is " + now + " from the lens: move it " +
+             (more ? "nearer" : "away, or design for its distance");
+    case Deviation::kIndex:
+      return "the refractive index is " + now + planned + ": design for it";
+    case Deviation::kPolish:
+      return "polish " + std::string(more ? "less" : "more") + ": σ is " + now + planned;
+    case Deviation::kBall:
+      return "the finishing ball's radius is " + now + planned + ": measure it, and plan for it";
+    case Deviation::kPitch:
+      return "the machine goes " + now + " too far across the rows" +
+             (m.nominal == 0.0 ? "" : planned) + ": correct its steps per mm";
+    case Deviation::kHaze:
+      break;
+  }
+  return now + " of the light is scattered by haze: polish finer, or clean lens and lamp";
+}
+
+namespace {
+
+/// "or a lamp's distance or an index that is off" of the alternatives.
+std::string alternatives_words(const FoundCause& cause) {
+  if (cause.alternatives.empty()) return "";
+  std::string words;
+  for (const Deviation d : cause.alternatives) {
+    words += (words.empty() ? "" : " or ") + std::string(name_of(d).words);
+  }
+  return "; a photograph cannot tell this from " + words;
+}
+
+std::string capital(std::string words) {
+  if (!words.empty() && words.front() >= 'a' && words.front() <= 'z') {
+    words.front() = static_cast<char>(words.front() - 'a' + 'A');
+  }
+  return words;
+}
+
+}  // namespace
+
+std::string verdict_of(const CheckResult& result, const Lens& lens, const CamOptions& options) {
+  if (result.fit.found.empty()) {
+    return "Nothing is wrong that shows in this photograph";
+  }
+  const FoundCause& first = result.fit.found.front();
+  return capital(words_of(first, lens, options)) + alternatives_words(first);
+}
+
+namespace {
+
+nlohmann::json likeness_json(const Likeness& likeness) {
+  return {{"mae", likeness.metrics.mae},
+          {"ssim", likeness.metrics.ssim},
+          {"blur_pixels", likeness.blur},
+          {"mae_blurred", likeness.blurred.mae},
+          {"ssim_blurred", likeness.blurred.ssim}};
+}
+
+nlohmann::json cause_json(const FoundCause& cause, const Lens& lens, const CamOptions& options) {
+  const Measured m = measured(cause.deviation, cause.value, cause.error, lens, options);
+  nlohmann::json alternatives = nlohmann::json::array();
+  for (const Deviation d : cause.alternatives) alternatives.push_back(name_of(d).key);
+  return {{"cause", name_of(cause.deviation).key},
+          {"value", m.value},
+          {"uncertainty", m.error},
+          {"planned", std::isfinite(m.nominal) ? nlohmann::json(m.nominal) : nlohmann::json()},
+          {"unit", std::string(m.unit.substr(m.unit.starts_with(' ') ? 1 : 0))},
+          {"evidence", cause.evidence},
+          {"words", words_of(cause, lens, options)},
+          {"cannot_be_told_from", alternatives}};
+}
+
+}  // namespace
+
+nlohmann::json check_json(const CheckResult& result, const Lens& lens, const CamOptions& options) {
+  nlohmann::json causes = nlohmann::json::array();
+  for (const FoundCause& cause : result.fit.found)
+    causes.push_back(cause_json(cause, lens, options));
+  return {{"program", program_mark()},
+          {"verdict", verdict_of(result, lens, options)},
+          {"causes", causes},
+          {"forecast_of", result.part ? "part" : "design"},
+          {"residual", result.fit.residual},
+          {"residual_without_causes", result.fit.unexplained},
+          {"pixels_across", result.seen_pixels},
+          {"clipped_share", result.unusable},
+          {"to_target", likeness_json(result.to_target)},
+          {"to_forecast", likeness_json(result.to_forecast)}};
+}
+
+namespace {
+
+/// Brighter than forecast in red, darker in blue, equal is white.
+ColorImage difference_map(const Image& seen, const Image& forecast) {
+  constexpr double kFull = 0.15;  // Display values at full colour.
+  const std::vector<double> one = encoded_values(seen);
+  const std::vector<double> other = encoded_values(forecast);
+  const int scale = std::max(1, 256 / std::min(seen.columns(), seen.rows()));
+  ColorImage map{scale * seen.columns(), scale * seen.rows(), {}};
+  for (int r = 0; r < map.rows; ++r) {
+    for (int c = 0; c < map.columns; ++c) {
+      const auto i = static_cast<std::size_t>((r / scale) * seen.columns() + c / scale);
+      const double off = std::clamp((one[i] - other[i]) / kFull, -1.0, 1.0);
+      const auto rest = static_cast<unsigned char>(std::lround(255.0 * (1.0 - std::abs(off))));
+      map.rgb.push_back(off > 0.0 ? 255 : rest);
+      map.rgb.push_back(rest);
+      map.rgb.push_back(off < 0.0 ? 255 : rest);
+    }
+  }
+  return map;
+}
+
+std::string likeness_row(const Likeness& l) {
+  return decimal_text(l.metrics.mae, 4) + ", SSIM " + decimal_text(l.metrics.ssim, 3) +
+         "; blurred by " + decimal_text(l.blur, 2) + " pixels: " + decimal_text(l.blurred.mae, 4) +
+         ", SSIM " + decimal_text(l.blurred.ssim, 3);
+}
+
+std::string causes_table(const CheckResult& result, const Lens& lens, const CamOptions& options) {
+  if (result.fit.found.empty()) return "";
+  const std::array<TableColumn, 4> columns{
+      {{"cause"}, {"value", true}, {"planned", true}, {"cannot be told from"}}};
+  std::vector<std::vector<std::string>> rows;
+  for (const FoundCause& cause : result.fit.found) {
+    const Measured m = measured(cause.deviation, cause.value, cause.error, lens, options);
+    std::string others;
+    for (const Deviation d : cause.alternatives) {
+      others += (others.empty() ? "" : ", ") + std::string(name_of(d).words);
+    }
+    rows.push_back({escape_html(name_of(cause.deviation).words),
+                    escape_html(plus_minus(m.value, m.error, m.unit)),
+                    escape_html(number_text(m.nominal, 3) + m.unit), escape_html(others)});
+  }
+  return html_table(columns, rows);
+}
+
+std::string report_page(const CheckResult& result, const Lens& lens, const CamOptions& options,
+                        const ColorImage& map) {
+  std::string causes = element("p", "", escape_html(verdict_of(result, lens, options) + "."));
+  for (std::size_t k = 1; k < result.fit.found.size(); ++k) {
+    const FoundCause& cause = result.fit.found[k];
+    causes += element(
+        "p", "",
+        escape_html("Also: " + words_of(cause, lens, options) + alternatives_words(cause) + "."));
+  }
+  const std::array<NamedText, 4> facts{{
+      {"MAE against the target", likeness_row(result.to_target)},
+      {"MAE against the forecast", likeness_row(result.to_forecast)},
+      {"Left unexplained, rms of display values", decimal_text(result.fit.residual, 4) +
+                                                      ", without causes " +
+                                                      decimal_text(result.fit.unexplained, 4)},
+      {"Photograph", decimal_text(result.seen_pixels, 0) + " pixels across the picture, " +
+                         percent_text(result.unusable) + " clipped"},
+  }};
+  const auto figure = [](const Image& image, const char* caption) {
+    return html_figure(grey_picture(image), caption, caption);
+  };
+  const std::string forecast =
+      result.part ? "Forecast of the part" : "Forecast of the lens as designed";
+  const std::string pictures =
+      element("div", "class=\"pictures\"",
+              figure(result.rectified, "On the wall, seen straight on") +
+                  figure(lens.target, "Target") + figure(result.forecast, forecast.c_str()) +
+                  html_figure(map, "difference",
+                              "Brighter than forecast in red, darker in blue; full colour at 0.15 "
+                              "of a display value"));
+  PageContent page;
+  page.title = "Check of a photograph";
+  page.header = element("h1", "", "What the wall says");
+  page.body = html_section("Causes", causes + causes_table(result, lens, options)) +
+              html_section("Pictures", pictures) + html_section("Figures", html_facts(facts));
+  page.footer = escape_html(program_mark());
+  return html_page(page);
+}
+
+}  // namespace
+
+std::vector<fs::path> write_check(const CheckResult& result, const Lens& lens,
+                                  const CamOptions& options, const fs::path& folder) {
+  PendingFiles files(folder);
+  const ColorImage map = difference_map(result.rectified, result.forecast);
+  const auto add = [&](const char* name, const Image& image) {
+    files.add(name, [&](const fs::path& beside) { write_image(image, beside); });
+  };
+  add(check_file::kRectified, result.rectified);
+  add(check_file::kTarget, lens.target);
+  add(check_file::kForecast, result.forecast);
+  files.add(check_file::kMap, [&](const fs::path& beside) { write_image(map, beside); });
+  files.add(check_file::kReport, report_page(result, lens, options, map));
+  files.add(check_file::kJson, check_json(result, lens, options).dump(2) + "\n");
+  return files.publish();
+}
+
+Workshop fitted_workshop(const CheckResult& result, const Lens& lens, const CamOptions& options) {
+  Workshop workshop = options.workshop;
+  const int ball = finishing_ball(options).number;
+  for (const FoundCause& cause : result.fit.found) {
+    switch (cause.deviation) {
+      case Deviation::kPolish:
+        workshop.polish.sigma *= std::exp(cause.value);
+        break;
+      case Deviation::kBall:
+        for (Tool& tool : workshop.tools) {
+          if (tool.number == ball) tool = resized(tool, tool.diameter * (1.0 + cause.value));
+        }
+        break;
+      case Deviation::kPitch:
+        workshop.process.finish.pitch_error += cause.value;
+        break;
+      case Deviation::kHaze: {
+        const double wavelength = kMmPerNm * options.wavelength_nm;
+        const double path = lens.setup.ior - 1.0;
+        const double share =
+            scattered_share({workshop.polish.roughness, workshop.polish.correlation}, path,
+                            wavelength) +
+            cause.value;
+        workshop.polish.roughness = std::sqrt(-std::log(1.0 - std::min(share, 0.99))) * wavelength /
+                                    (2.0 * std::numbers::pi * path) / kMmPerNm;
+        break;
+      }
+      default:
+        break;
+    }
+  }
+  return workshop;
+}
+
+}  // namespace lensforge

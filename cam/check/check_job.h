@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "cam/check/causes.h"
+#include "cam/check/wall_model.h"
+#include "cam/check/wall_view.h"
+#include "cam/plan/cam_options.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/lens/lens.h"
+
+namespace lensforge {
+
+/// Names of the files that write_check() writes.
+namespace check_file {
+inline constexpr const char* kJson = "check.json";
+inline constexpr const char* kReport = "report.html";
+inline constexpr const char* kRectified = "rectified.png";
+inline constexpr const char* kForecast = "forecast.png";
+inline constexpr const char* kTarget = "target.png";
+inline constexpr const char* kMap = "difference.png";
+}  // namespace check_file
+inline constexpr std::array kCheckFiles = {check_file::kJson,      check_file::kReport,
+                                           check_file::kRectified, check_file::kForecast,
+                                           check_file::kTarget,    check_file::kMap};
+
+/// True if a check may write a file of this name.
+bool is_name_of_check(const std::string& name);
+
+/// How near a photograph's picture is to another one.
+struct Likeness {
+  ImageMetrics metrics;  ///< Against the other picture.
+  ImageMetrics blurred;  ///< Against the other picture blurred by a Gaussian, for the least MAE.
+  double blur = 0.0;     ///< Standard deviation of that, pixels.
+};
+
+/// What a photograph shows of a lens, its pictures with the lens's pixels, linear light.
+struct CheckResult {
+  Image rectified;  ///< Without the room's light and the camera's falloff, as bright as the target.
+  Image forecast;
+  Likeness to_target, to_forecast;
+  CauseFit fit;
+  bool part = false;         ///< The forecast is the part's; else the design's.
+  std::string fault;         ///< Why it is not.
+  double seen_pixels = 0.0;  ///< Of the photograph, across the picture.
+  double unusable = 0.0;     ///< Share of the picture that is clipped.
+};
+
+/// Checks a photograph of the wall against what the lens should project.
+/// @param options  with the workshop. @throw InputError as find_picture(); Interrupted.
+CheckResult check_photograph(const Lens& lens, const CamOptions& options, const Photograph& photo,
+                             const Executor& executor, const RunControl& control);
+
+/// A cause in words: "the wall is 6.1 ± 0.2 mm too far: move it nearer".
+std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions& options);
+/// What is wrong, in a sentence: that of the likeliest cause, or that nothing shows.
+std::string verdict_of(const CheckResult& result, const Lens& lens, const CamOptions& options);
+
+/// The content of check.json.
+nlohmann::json check_json(const CheckResult& result, const Lens& lens, const CamOptions& options);
+
+/// Writes a check's files into a folder, all or none. @return their paths. @throw RunError
+std::vector<std::filesystem::path> write_check(const CheckResult& result, const Lens& lens,
+                                               const CamOptions& options,
+                                               const std::filesystem::path& folder);
+
+/// The workshop with what a check found of it: polish.sigma, polish.roughness, the finishing
+/// ball's diameter and finish.pitch_error.
+Workshop fitted_workshop(const CheckResult& result, const Lens& lens, const CamOptions& options);
+
+}  // namespace lensforge

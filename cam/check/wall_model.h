@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cam/plan/cam_options.h"
+#include "cam/plan/cut_plan.h"
+#include "cam/tolerance/part_model.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/lens/lens.h"
+
+namespace lensforge {
+
+/// What may differ between a lens's forecast and its picture on a wall.
+enum class Deviation {
+  kDistance,  ///< Of the wall, a share of the lens's distance from it.
+  kTiltX,     ///< Of the wall about its horizontal axis, rad.
+  kTiltY,     ///< About its vertical axis, rad.
+  kLampSize,  ///< Square of the lamp's full angle as seen from the lens, minus the design's, rad².
+  kLampDistance,  ///< 1 / distance of the lamp, minus the design's, as a share of 1 / focal length.
+  kIndex,         ///< Of (n − 1), a share.
+  kPolish,        ///< ln(σ / σ of the workshop).
+  kBall,          ///< Of the finishing ball's radius, a share.
+  kPitch,         ///< FinishProcess::pitch_error beyond the workshop's, a share.
+  kHaze,          ///< Haze::share beyond the workshop's.
+};
+inline constexpr std::size_t kDeviations = 10;
+
+/// One value of each Deviation, all 0 for the forecast.
+using Deviations = Eigen::Matrix<double, static_cast<int>(kDeviations), 1>;
+
+inline Eigen::Index index_of(Deviation deviation) { return static_cast<Eigen::Index>(deviation); }
+
+/// Step of each for derivatives by differences: its picture changes well above rounding, and
+/// linearly.
+Deviations deviation_steps(const OpticalSetup& setup);
+
+/// Limits within which pictures are computed.
+struct DeviationLimits {
+  Deviations least, most;
+};
+DeviationLimits deviation_limits(const OpticalSetup& setup);
+
+/// Distance of the picture's middle from the lens's, mm.
+double wall_distance(const OpticalSetup& setup);
+/// Full angle of the lamp as seen from the lens, rad.
+double lamp_angle(const OpticalSetup& setup);
+/// Distance of the lamp from the lens, mm; none for parallel light.
+std::optional<double> lamp_distance(const OpticalSetup& setup);
+
+/// Predicts pictures on the wall, with light around the picture's rectangle. The forecast is that
+/// of cam's chain: the finishing rows are planned and fitted anew, and what they leave is polished.
+/// Deviations change it as they change the picture of PartModel. Where parts cannot be drawn
+/// (tolerance_fault(), creases) it is the lens as designed.
+class WallModel {
+ public:
+  /// @param lens  must outlive this. @param options  with the workshop.
+  /// @param fine  pixels of the predicted pictures per pixel of the lens's picture, ≥ 1.
+  /// @throw Interrupted
+  WallModel(const Lens& lens, const CamOptions& options, int fine, const Executor& executor,
+            const RunControl& control);
+
+  /// Irradiance relative to all light spread evenly over the picture. Deviations beyond
+  /// deviation_limits() count as these. @throw Interrupted
+  [[nodiscard]] Image picture(const Deviations& deviations) const;
+
+  [[nodiscard]] const Lens& lens() const { return lens_; }
+  [[nodiscard]] const CamOptions& options() const { return options_; }
+  /// False if the part's own deviations have no effect here.
+  [[nodiscard]] bool has_part() const { return part_ != nullptr; }
+  /// Why there is no part; empty if there is one.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+  /// True if the deviation can show at all.
+  [[nodiscard]] bool shows(Deviation deviation) const;
+  /// Pixels of a picture beyond each side of the picture's rectangle.
+  [[nodiscard]] int margin() const { return margin_; }
+  [[nodiscard]] int fine() const { return fine_; }
+
+ private:
+  void cut_part(const CutSetup& setup, const RunControl& control);
+  /// Shares of the light by cam's chain.
+  [[nodiscard]] std::vector<double> light_of(const SurfaceField& part,
+                                             const RunControl& control) const;
+  [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
+  [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
+  /// Shares of the light by PartModel, or of the lens as designed.
+  [[nodiscard]] std::vector<double> flux(const Deviations& deviations) const;
+
+  const Lens& lens_;
+  CamOptions options_;
+  int fine_;
+  int margin_;
+  OpticalSetup wide_;  ///< The lens's, with margin and fine pixels.
+  double height_;      ///< Of the surface, mm.
+  Passes passes_;
+  std::string fault_;
+  std::unique_ptr<const PartModel> part_;
+  std::vector<double> correction_;  ///< The chain's forecast less that of the model.
+  Executor executor_;
+};
+
+}  // namespace lensforge

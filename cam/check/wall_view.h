@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "cam/coupon/coupon_fit.h"
+#include "core/image/image.h"
+
+namespace lensforge {
+
+/// A photograph of the wall in linear light.
+struct Photograph {
+  Image light;                        ///< 1 is the white of the file.
+  std::vector<unsigned char> usable;  ///< Per pixel: 1 unless it is clipped.
+  std::string name;                   ///< For messages.
+
+  [[nodiscard]] bool is_usable(int column, int row) const {
+    return usable[static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns()) +
+                  static_cast<std::size_t>(column)] != 0;
+  }
+};
+
+/// Light above which a pixel counts as clipped.
+inline constexpr double kClipped = 0.955;
+
+/// A photograph of the wall. @param dark  one with the lamp off, in the same place, that is
+/// subtracted; empty: none.
+/// @throw InputError if their sizes differ.
+Photograph photograph(Image light, const Image& dark, const std::string& name);
+
+/// One photograph from several of different exposures: each is related to the one before by the
+/// pixels that neither clips, and a pixel's light is that of the longest exposure that does not
+/// clip it, in the unit of the shortest.
+/// @throw InputError if sizes differ, or two have too few pixels in common.
+Photograph bracketed(const std::vector<Photograph>& exposures);
+
+/// The same with pixels about `by` times as wide: means of light over whole pixels, clipped if any
+/// of them is; up to `by` columns and rows at its sides are left out.
+Photograph shrunk(const Photograph& photo, double by);
+
+/// A predicted picture on the wall: `margin` of its pixels lie beyond each side of the rectangle
+/// whose coordinates run from −1 to 1, to the right and down.
+struct WallPicture {
+  Image light;
+  int margin = 0;
+
+  [[nodiscard]] double inner_columns() const { return light.columns() - 2.0 * margin; }
+  [[nodiscard]] double inner_rows() const { return light.rows() - 2.0 * margin; }
+  /// Light, and its derivatives by the place on the wall.
+  struct Light {
+    double value = 0.0;
+    Eigen::Vector2d gradient{0.0, 0.0};
+  };
+  /// Cubic convolution (Keys 1981) between pixels' middles; 0 outside.
+  [[nodiscard]] Light at(const Eigen::Vector2d& wall) const;
+};
+
+/// How a camera sees the wall: the values of a fit.
+///
+/// Notation: X a pixel from the middle of the photograph in half diagonals; Y = X (1 + k₁ r² + k₂
+/// r⁴), r = |X|, what a lens without distortion would have seen; w = H Y, homogeneous, the place on
+/// the wall (WallPicture); the light of the pixel is f (g p(w) + b + c·X) with the camera's falloff
+/// f = 1 + a·X + X·B X.
+namespace view {
+inline constexpr int kHomography = 0;  ///< Rows of H, but its last element, 1.
+inline constexpr int kDistortion = 8;  ///< k₁, k₂
+inline constexpr int kGain = 10;       ///< g
+inline constexpr int kFalloff = 11;    ///< a, B₁₁, B₁₂, B₂₂
+inline constexpr int kAmbient = 16;    ///< b, then c: the room's light.
+inline constexpr int kCount = 19;
+}  // namespace view
+
+/// Where a pixel sees the wall. @param pixel  X.
+Eigen::Vector2d wall_of(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel);
+
+/// Light p of the wall's picture from that of a pixel. @param pixel  X.
+double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, double light);
+
+/// Pixels of a photograph that see the wall around a picture, and their light.
+class SeenPixels {
+ public:
+  /// Pixels whose wall lies within `reach` (1: the rectangle itself) by this view.
+  /// @param view  of a photograph with these proportions.
+  SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, double reach);
+
+  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(places_.size()); }
+  /// Display values that the view makes of a picture: the mean of 2 × 2 places in every pixel,
+  /// which is that over the pixel where it is twice as wide as the picture's.
+  [[nodiscard]] Eigen::VectorXd shown(const Eigen::VectorXd& view, const WallPicture& wall) const;
+  /// Their derivatives by the view's values; those of light by its middle.
+  [[nodiscard]] Eigen::MatrixXd derivatives(const Eigen::VectorXd& view,
+                                            const WallPicture& wall) const;
+  /// Display values of the photograph.
+  [[nodiscard]] const Eigen::VectorXd& seen() const { return seen_; }
+  /// Correlation of both over pixels that see the rectangle itself.
+  [[nodiscard]] double correlation(const Eigen::VectorXd& view, const WallPicture& wall) const;
+
+ private:
+  [[nodiscard]] WallPicture::Light seen_light(const Eigen::VectorXd& view, const WallPicture& wall,
+                                              const Eigen::Vector2d& place) const;
+
+  std::vector<Eigen::Vector2d> places_;
+  Eigen::VectorXd seen_;
+  double pixel_;  ///< Side, in half diagonals.
+};
+
+/// Fit of a view's values, some free, to a photograph of a known picture.
+Eigen::VectorXd fit_view(const SeenPixels& pixels, const WallPicture& wall, Eigen::VectorXd view,
+                         const std::vector<int>& free);
+
+/// Problem in a view's values, all free, without its residuals.
+LeastSquares view_problem();
+
+/// Finds a picture in a photograph.
+/// @throw InputError naming the photograph: no picture in it, too dark, clipped, mirrored, upside
+///        down, turned, or a picture of another lens.
+Eigen::VectorXd find_picture(const Photograph& photo, const WallPicture& wall);
+
+/// Pixels of the photograph across the picture.
+double pixels_across(const Photograph& photo, const Eigen::VectorXd& view);
+
+}  // namespace lensforge

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "cam/cam.h"
+#include "cam/milled/ball_sweep.h"
+#include "cam/path/finish_raster.h"
+#include "cam/plan/cut_plan.h"
+#include "core/compute/executor.h"
+#include "core/image/image.h"
+#include "core/lens/lens.h"
+
+/// A workshop, a lamp, a wall and a camera that do not exist, for tests of `check`. Nothing here is
+/// shared with its fit: the light is that of cam's chain of surfaces (MilledField, PolishedField,
+/// render_field()) under many points of a lamp, the camera a pinhole with Brown's distortion.
+namespace lensforge::virtual_wall {
+
+/// What is wrong. All 0: nothing.
+struct Fault {
+  double distance = 0.0;     ///< Of the wall, a share.
+  double tilt_x = 0.0;       ///< Of the wall about the picture's x axis, rad.
+  double tilt_y = 0.0;       ///< rad
+  double lamp = 0.0;         ///< Of the lamp's width, a share.
+  double index = 0.0;        ///< Of the index.
+  double sigma = 0.0;        ///< Of the polish's σ, a share.
+  double ball = 0.0;         ///< Of the ball's radius, a share.
+  double pitch_error = 0.0;  ///< Across the rows, a share.
+  double haze = 0.0;         ///< Share of the light that is scattered, 25 mrad wide.
+};
+
+/// Irradiance of a part of the wall around the picture; 1: all light evenly on the picture.
+struct WallLight {
+  Image light;
+  Eigen::Vector2d size{0.0, 0.0};  ///< mm; the picture is in its middle.
+};
+
+/// Cuts a lens once and shows what parts with faults project.
+class Workshop {
+ public:
+  /// @param lens  must outlive this.
+  Workshop(const Lens& lens, const CamOptions& options, const Executor& executor);
+
+  [[nodiscard]] WallLight light(const Fault& fault) const;
+
+ private:
+  [[nodiscard]] std::vector<BallPath> paths(const Fault& fault) const;
+
+  const Lens& lens_;
+  CamOptions options_;
+  Executor executor_;
+  CutSetup setup_;
+  std::vector<std::pair<double, std::vector<RasterRow>>> rows_;  ///< By the ball's radius.
+};
+
+/// A camera before the wall.
+struct Camera {
+  int columns = 264;
+  int rows = 198;
+  double focal = 1.2;  ///< In widths of the photograph.
+  double yaw = 0.0;    ///< From the wall's normal, rad.
+  double pitch = 0.0;  ///< rad
+  double roll = 0.0;   ///< rad
+  double away = 2.2;   ///< Distance, in widths of the picture.
+  double k1 = 0.0;     ///< Distortion by radius in half widths (Brown).
+  double k2 = 0.0;
+  double vignetting = 0.0;  ///< Share of light that is missing in the corners.
+  double white = 0.85;    ///< Display value of the brightest light but for 0.1 %; above 1 it clips.
+  double ambient = 0.0;   ///< Light of the room, a share of white.
+  double slope = 0.0;     ///< Of that across the photograph, a share of it.
+  double well = 20000.0;  ///< Photons of white.
+  int jpeg = 92;          ///< Quality; 0: none.
+  std::uint64_t seed = 1;
+};
+
+/// A photograph with 8 bits a pixel, decoded: linear light, 1 is white.
+/// @param lit  false: the lamp is off.
+Image photograph(const WallLight& wall, const Eigen::Vector2d& picture, const Camera& camera,
+                 bool lit = true);
+
+/// A camera of everyday, by number.
+Camera any_camera(std::uint64_t seed);
+
+}  // namespace lensforge::virtual_wall
