@@ -294,6 +294,8 @@ constexpr std::array kSubcommands{
                "lens folders on one blank to G-code"},
     Subcommand{"coupon", coupon_command, "coupon --out DIR",
                "test piece that calibrates a workshop"},
+    Subcommand{"check", check_command, "check LENS PHOTO... --out DIR",
+               "photograph of the wall to what went wrong"},
     Subcommand{"export", export_command, "export DIR --out FILE",
                "lens folder to STEP, IGES, a closed mesh, a height map"},
     Subcommand{"send", send_command, "send FILE.ngc --port PORT", "G-code to a controller"},

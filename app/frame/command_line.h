@@ -24,6 +24,7 @@ int render_command(const Arguments& arguments);
 int cam_command(const Arguments& arguments);
 int nest_command(const Arguments& arguments);
 int coupon_command(const Arguments& arguments);
+int check_command(const Arguments& arguments);
 int export_command(const Arguments& arguments);
 int send_command(const Arguments& arguments);
 int studio_command(const Arguments& arguments);

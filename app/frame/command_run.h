@@ -177,6 +177,7 @@ CommandCall view_call();
 CommandCall plan_call();
 CommandCall nest_call();
 CommandCall coupon_call();
+CommandCall check_call();
 CommandCall info_call();
 /// @param program  words that start a command of a job in a process of its own.
 CommandCall batch_call(const Arguments& program);

@@ -320,6 +320,7 @@ void add_plain_commands(py::module_& module) {
   add_command(module, "view", app::view_call(), {"--out", "--device"});
   add_command(module, "nest", app::nest_call(), {"--out", "--device"});
   add_command(module, "coupon", app::coupon_call(), {"--out", "--device"});
+  add_command(module, "check", app::check_call(), {"--out", "--device"});
   add_command(module, "info", app::info_call(), {"--threads", "--device"});
   // A job runs in a process of its own, since it may crash or use up the memory.
   const auto program = py::module_::import("lensforge._program").attr("WORDS");

@@ -13,8 +13,8 @@ namespace lensforge::app {
 namespace {
 
 /// Those with options of their own, as the page has them.
-constexpr std::array kCommands{"studio", "plan", "design",  "render", "cam",   "nest", "coupon",
-                               "export", "send", "reflect", "view",   "batch", "info"};
+constexpr std::array kCommands{"studio", "plan",   "design", "render",  "cam",  "nest",  "coupon",
+                               "check",  "export", "send",   "reflect", "view", "batch", "info"};
 
 /// Output of a command on standard output.
 std::string printed(const std::vector<std::string>& arguments) {

@@ -5,6 +5,7 @@ from ._errors import InputError, MissingFileError, RunError
 from ._functions import (
     batch,
     cam,
+    check,
     coupon,
     design,
     export,
@@ -27,6 +28,7 @@ __all__ = [
     "__version__",
     "batch",
     "cam",
+    "check",
     "coupon",
     "design",
     "export",

@@ -86,6 +86,14 @@ def nest(
     lenses: Iterable[Lens | _Path], out: _Path, *, progress: _Progress = None, **options: _Option
 ) -> dict[str, Any]: ...
 def coupon(out: _Path, *, progress: _Progress = None, **options: _Option) -> dict[str, Any]: ...
+def check(
+    lens: Lens | _Path,
+    photos: _Path | Iterable[_Path],
+    out: _Path,
+    *,
+    progress: _Progress = None,
+    **options: _Option,
+) -> dict[str, Any]: ...
 def reflect(
     mesh: _Path, out: _Path | None = None, *, progress: _Progress = None, **options: _Option
 ) -> dict[str, Any]: ...

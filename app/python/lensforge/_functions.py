@@ -139,6 +139,25 @@ def coupon(out, *, progress=None, **options):
         return _lensforge.coupon({"--out": path_of(out)}, options, told)
 
 
+@with_options("check")
+def check(lens, photos, out, *, progress=None, **options):
+    """Finds a lens's picture in a photograph of the wall and says what went wrong.
+
+    lens: a saved Lens or a lens folder's path; photos: a path, or paths of several exposures; out:
+    the folder to write; progress: as in design(). Returns a dict with "verdict", "causes" and what
+    else check.json has. The options are those of lensforge check:
+    """
+    if isinstance(photos, (str, bytes, os.PathLike)):
+        photos = [photos]
+    given = {
+        "LENS": _folder(lens),
+        "PHOTO": [path_of(photo) for photo in photos],
+        "--out": path_of(out),
+    }
+    with function_of(progress) as told:
+        return _lensforge.check(given, options, told)
+
+
 @with_options("reflect")
 def reflect(mesh, out=None, *, progress=None, **options):
     """Deforms a mesh so that it reflects light as wanted.

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/common_output.h"
+#include "app/frame/option_set.h"
+#include "cam/check/check_job.h"
+#include "cam/check/wall_view.h"
+#include "cam/coupon/coupon_fit.h"
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "core/io/files.h"
+#include "core/io/lens_folder.h"
+#include "core/lens/lens.h"
+#include "core/schema/toml.h"
+#include "core/text/words.h"
+#include "design/design.h"
+
+namespace lensforge::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Options of `lensforge check`.
+struct CheckSettings {
+  std::string source;
+  std::vector<std::string> photos;
+  std::string out;
+  std::string dark;
+  std::string workshop;
+  std::string fit;
+  bool force = false;
+  CamOptions cam;
+};
+
+void describe(Description& d, CheckSettings& settings) {
+  d.text("LENS", settings.source, "", "lens folder").needed = true;
+  d.texts("PHOTO", settings.photos, "",
+          "photograph of the wall; several of the same view with different exposures count as one")
+      .needed = true;
+  d.text("--out", settings.out, "DIR", "folder for report, pictures and check.json").needed = true;
+  d.text("--dark", settings.dark, "PHOTO",
+         "the same view and exposure with the lamp off: the room's light, which is subtracted");
+  d.text("--workshop", settings.workshop, "FILE.toml",
+         "the workshop that made the part; without it the default one");
+  d.text("--fit", settings.fit, "FILE.toml",
+         "write the workshop with what the photograph tells of polish, finishing ball, pitch error "
+         "and haze");
+  d.flag("--force", settings.force, "replace files that lensforge did not write");
+}
+
+Photograph read_photo(const std::string& file, const Image& dark, CommandFrame& frame) {
+  return photograph(read_image(file, frame.control()).image, dark, file);
+}
+
+/// @throw InputError as bracketed().
+Photograph read_photos(const CheckSettings& settings, CommandFrame& frame) {
+  if (settings.photos.size() > 1 && !settings.dark.empty()) {
+    throw InputError("--dark " + settings.dark +
+                     ": belongs to one exposure; give one PHOTO, or leave it out");
+  }
+  Image dark;
+  if (!settings.dark.empty()) dark = read_image(settings.dark, frame.control()).image;
+  if (settings.photos.size() == 1) return read_photo(settings.photos.front(), dark, frame);
+  std::vector<Photograph> exposures;
+  for (const std::string& file : settings.photos) {
+    exposures.push_back(read_photo(file, {}, frame));
+  }
+  return bracketed(exposures);
+}
+
+std::string workshop_text(const CheckSettings& settings, const Workshop& fitted) {
+  const std::string text =
+      settings.workshop.empty() ? "" : read_toml_file(settings.workshop, "a workshop");
+  if (!text.empty()) {
+    if (const auto edited = edited_workshop(text, fitted)) return *edited;
+  }
+  return workshop_toml(fitted);
+}
+
+CommandResult run(CommandFrame& frame, CheckSettings& settings) {
+  if (!settings.workshop.empty()) settings.cam.workshop = read_workshop(settings.workshop);
+  const Lens lens = read_lens(settings.source);
+  validate(settings.cam, lens.setup);
+  if (!settings.fit.empty()) require_replaceable("--fit", settings.fit, settings.force);
+  frame.begin_folder(settings.out).remove_partial_files(is_name_of_check);
+  for (const char* name : kCheckFiles) {
+    require_replaceable("--out", fs::path(settings.out) / name, settings.force);
+  }
+  const Photograph photo = read_photos(settings, frame);
+  const CheckResult result =
+      check_photograph(lens, settings.cam, photo, frame.executor(), frame.control());
+  std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
+  if (!settings.fit.empty()) {
+    write_whole_file(settings.fit,
+                     workshop_text(settings, fitted_workshop(result, lens, settings.cam)));
+    files.emplace_back(settings.fit);
+  }
+  nlohmann::json json = check_json(result, lens, settings.cam);
+  json["status"] = "done";
+  json["options"] = frame.options().used();
+  json["files"] = files_json(files);
+  std::string text = verdict_of(result, lens, settings.cam) + "\n";
+  for (std::size_t k = 1; k < result.fit.found.size(); ++k) {
+    text += "also: " + words_of(result.fit.found[k], lens, settings.cam) + "\n";
+  }
+  text += "  MAE against the target " + fixed(result.to_target.metrics.mae, 4) +
+          ", against the forecast " + fixed(result.to_forecast.metrics.mae, 4) + "\n";
+  std::vector<std::string> warnings;
+  if (!result.part) {
+    warnings.push_back("the forecast is that of the lens as designed: lensforge " + result.fault);
+  }
+  return {json,
+          text,
+          kDone,
+          std::move(warnings),
+          {"look at " + (fs::path(settings.out) / check_file::kReport).string()}};
+}
+
+Command<CheckSettings> command() {
+  return {"check", "Finds a lens's picture in a photograph of the wall and says what went wrong.",
+          run};
+}
+
+}  // namespace
+
+int check_command(const Arguments& arguments) { return run_command(command(), arguments); }
+
+CommandCall check_call() { return call_of(command(), CheckSettings()); }
+
+}  // namespace lensforge::app
