@@ -18,6 +18,9 @@ namespace {
 constexpr double kEvidence = 60.0;
 /// Evidence that an alternative may lack.
 constexpr double kAlike = 12.0;
+/// Share of its effect that a further cause must not have in common with those before: distance and
+/// index differ by less, and would only be weighed against each other.
+constexpr double kOwnShare = 0.05;
 constexpr std::size_t kMostCauses = 4;
 constexpr int kMostRounds = 4;
 /// Steps shorter than this share of deviation_steps() end a fit.
@@ -208,16 +211,24 @@ Deviations least_named(const Deviations& steps) {
 }
 
 /// The deviation with the most evidence; none if there is not enough.
+/// @param refused  those that are not asked again.
 std::optional<Deviation> next_cause(const DeviationFit& fit, const DeviationFit::Tangents& all,
-                                    const Deviations& prior) {
+                                    const Deviations& prior,
+                                    const std::vector<Deviation>& refused) {
+  const DeviationFit::Tangents alone = all.beyond({});
   const DeviationFit::Tangents tangents = all.beyond(fit.active());
   const Deviations least = least_named(fit.steps());
+  const auto is_in = [](const std::vector<Deviation>& list, Deviation d) {
+    return std::find(list.begin(), list.end(), d) != list.end();
+  };
   std::optional<Deviation> best;
   double most = kEvidence;
   for (std::size_t k = 0; k < kDeviations; ++k) {
     const auto d = static_cast<Deviation>(k);
-    if (std::find(fit.active().begin(), fit.active().end(), d) != fit.active().end()) continue;
     const auto i = static_cast<Eigen::Index>(k);
+    if (is_in(fit.active(), d) || is_in(refused, d)) continue;
+    const double own = tangents.columns.col(i).squaredNorm();
+    if (own < kOwnShare * alone.columns.col(i).squaredNorm()) continue;
     const Score score = score_of(tangents.residuals, tangents.columns.col(i));
     if (d == Deviation::kHaze && score.value < 0.0) continue;
     const double value = score.value * fit.steps()[i];
@@ -299,8 +310,8 @@ CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eig
   const Deviations least = least_named(fit.steps());
   std::vector<Deviation> refused;  // Those that later ones made superfluous.
   while (fit.active().size() < kMostCauses) {
-    const std::optional<Deviation> next = next_cause(fit, tangents, prior);
-    if (!next || std::find(refused.begin(), refused.end(), *next) != refused.end()) break;
+    const std::optional<Deviation> next = next_cause(fit, tangents, prior, refused);
+    if (!next) break;
     fit.activate(*next);
     fit.run();
     tangents = fit.tangents();
