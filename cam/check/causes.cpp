@@ -3,9 +3,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <limits>
 #include <numeric>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -14,14 +15,13 @@
 namespace lensforge {
 namespace {
 
-/// Evidence below which a cause is not named.
-constexpr double kEvidence = 60.0;
+/// Evidence that every cause must add: some three times ln N, as in the Bayesian information
+/// criterion, since predictions have errors of their own.
+constexpr double kCost = 30.0;
 /// Evidence that an alternative may lack.
 constexpr double kAlike = 12.0;
-/// Share of its effect that a further cause must not have in common with those before: distance and
-/// index differ by less, and would only be weighed against each other.
-constexpr double kOwnShare = 0.05;
-constexpr std::size_t kMostCauses = 4;
+constexpr int kMostCauses = 4;
+constexpr int kMostSearches = 6;
 constexpr int kMostRounds = 4;
 /// Steps shorter than this share of deviation_steps() end a fit.
 constexpr double kShortStep = 0.02;
@@ -39,9 +39,9 @@ class DeviationFit {
  public:
   DeviationFit(const WallModel& model, const SeenPixels& pixels, Eigen::VectorXd view,
                const RunControl& control)
-      : model_(model),
-        pixels_(pixels),
-        control_(control),
+      : model_(&model),
+        pixels_(&pixels),
+        control_(&control),
         steps_(deviation_steps(model.lens().setup)),
         limits_(deviation_limits(model.lens().setup)),
         view_(std::move(view)) {
@@ -52,12 +52,14 @@ class DeviationFit {
   [[nodiscard]] const Deviations& deviations() const { return at_; }
   [[nodiscard]] const std::vector<Deviation>& active() const { return active_; }
   [[nodiscard]] double square() const { return square_; }
-  [[nodiscard]] double samples() const { return static_cast<double>(pixels_.size()); }
+  [[nodiscard]] double samples() const { return static_cast<double>(pixels_->size()); }
 
-  void activate(Deviation deviation) { active_.push_back(deviation); }
-  void drop(Deviation deviation) {
-    std::erase(active_, deviation);
-    at_[index_of(deviation)] = 0.0;
+  /// These may differ from 0; the others no longer do.
+  void activate(const std::vector<Deviation>& active) {
+    const Deviations before = at_;
+    at_.setZero();
+    for (const Deviation d : active) at_[index_of(d)] = before[index_of(d)];
+    active_ = active;
   }
   /// Fits view and active deviations.
   void run();
@@ -68,23 +70,25 @@ class DeviationFit {
     Eigen::MatrixXd view;
     Eigen::MatrixXd columns;  ///< One per deviation and step of it; 0 for those that do not show.
 
-    /// The same less what the view and these deviations could change as well.
-    [[nodiscard]] Tangents beyond(const std::vector<Deviation>& known) const;
+    /// The same less what the view could change as well.
+    [[nodiscard]] Tangents beyond_view() const;
   };
   [[nodiscard]] Tangents tangents() const;
   [[nodiscard]] const Deviations& steps() const { return steps_; }
+  [[nodiscard]] const DeviationLimits& limits() const { return limits_; }
+  [[nodiscard]] const SeenPixels& pixels() const { return *pixels_; }
 
  private:
   [[nodiscard]] WallPicture wall(const Deviations& at) const {
-    if (control_.stop_requested()) throw Interrupted();
-    return wall_picture(model_, at);
+    if (control_->stop_requested()) throw Interrupted();
+    return wall_picture(*model_, at);
   }
   /// Change of the picture by one step.
   [[nodiscard]] Image change(Deviation deviation, const Image& from) const;
 
-  const WallModel& model_;
-  const SeenPixels& pixels_;
-  const RunControl& control_;
+  const WallModel* model_;
+  const SeenPixels* pixels_;
+  const RunControl* control_;
   Deviations steps_;
   DeviationLimits limits_;
   Eigen::VectorXd view_;
@@ -123,19 +127,19 @@ void DeviationFit::run() {
       return picture;
     };
     problem.residuals = [&](const Eigen::VectorXd& p) {
-      return Eigen::VectorXd(pixels_.shown(p.head(view::kCount), moved(p)) - pixels_.seen());
+      return Eigen::VectorXd(pixels_->shown(p.head(view::kCount), moved(p)) - pixels_->seen());
     };
     problem.derivatives = [&](const Eigen::VectorXd& p) {
       const WallPicture now = moved(p);
       const Eigen::VectorXd view = p.head(view::kCount);
-      const Eigen::VectorXd shown = pixels_.shown(view, now);
-      Eigen::MatrixXd rows = pixels_.derivatives(view, now);
+      const Eigen::VectorXd shown = pixels_->shown(view, now);
+      Eigen::MatrixXd rows = pixels_->derivatives(view, now);
       rows.conservativeResize(Eigen::NoChange, count);
       for (std::size_t k = 0; k < changes.size(); ++k) {
         constexpr double kStep = 0.1;
         const WallPicture beyond{sum_of(now.light, kStep, changes[k]), now.margin};
         rows.col(view::kCount + static_cast<Eigen::Index>(k)) =
-            (pixels_.shown(view, beyond) - shown) / kStep;
+            (pixels_->shown(view, beyond) - shown) / kStep;
       }
       return rows;
     };
@@ -153,29 +157,25 @@ void DeviationFit::run() {
     }
     if (longest < kShortStep) break;
   }
-  square_ = (pixels_.shown(view_, wall(at_)) - pixels_.seen()).squaredNorm();
+  square_ = (pixels_->shown(view_, wall(at_)) - pixels_->seen()).squaredNorm();
 }
 
 DeviationFit::Tangents DeviationFit::tangents() const {
   const WallPicture base = wall(at_);
-  const Eigen::VectorXd shown = pixels_.shown(view_, base);
-  Tangents result{pixels_.seen() - shown, pixels_.derivatives(view_, base),
+  const Eigen::VectorXd shown = pixels_->shown(view_, base);
+  Tangents result{pixels_->seen() - shown, pixels_->derivatives(view_, base),
                   Eigen::MatrixXd::Zero(shown.size(), static_cast<int>(kDeviations))};
   for (std::size_t k = 0; k < kDeviations; ++k) {
     const auto d = static_cast<Deviation>(k);
-    if (!model_.shows(d)) continue;
+    if (!model_->shows(d)) continue;
     const WallPicture moved{sum_of(base.light, 1.0, change(d, base.light)), base.margin};
-    result.columns.col(static_cast<Eigen::Index>(k)) = pixels_.shown(view_, moved) - shown;
+    result.columns.col(static_cast<Eigen::Index>(k)) = pixels_->shown(view_, moved) - shown;
   }
   return result;
 }
 
-DeviationFit::Tangents DeviationFit::Tangents::beyond(const std::vector<Deviation>& known) const {
-  Eigen::MatrixXd basis(view.rows(), view.cols() + std::ssize(known));
-  basis.leftCols(view.cols()) = view;
-  for (std::size_t k = 0; k < known.size(); ++k) {
-    basis.col(view.cols() + static_cast<Eigen::Index>(k)) = columns.col(index_of(known[k]));
-  }
+DeviationFit::Tangents DeviationFit::Tangents::beyond_view() const {
+  Eigen::MatrixXd basis = view;
   for (Eigen::Index k = 0; k < basis.cols(); ++k) basis.col(k).normalize();
   basis = Eigen::HouseholderQR<Eigen::MatrixXd>(basis).householderQ() *
           Eigen::MatrixXd::Identity(basis.rows(), basis.cols());
@@ -185,22 +185,7 @@ DeviationFit::Tangents DeviationFit::Tangents::beyond(const std::vector<Deviatio
   return rest;
 }
 
-/// Best value, in steps, and evidence of a deviation, to first order.
-struct Score {
-  double value = 0.0;
-  double evidence = 0.0;
-};
-
 constexpr double kFaintest = 1e-6;  ///< Change per step of a display value, rms, that counts as 0.
-
-Score score_of(const Eigen::VectorXd& residuals, const Eigen::VectorXd& column) {
-  const double square = column.squaredNorm();
-  const auto count = static_cast<double>(residuals.size());
-  if (square < kFaintest * kFaintest * count) return {};
-  const double along = column.dot(residuals);
-  const double all = residuals.squaredNorm();
-  return {along / square, count * -std::log(1.0 - std::min(along * along / square / all, 0.999))};
-}
 
 /// Smaller deviations are not named: neither are cameras and predictions better.
 Deviations least_named(const Deviations& steps) {
@@ -210,76 +195,206 @@ Deviations least_named(const Deviations& steps) {
   return least;
 }
 
-/// The deviation with the most evidence; none if there is not enough.
-/// @param refused  those that are not asked again.
-std::optional<Deviation> next_cause(const DeviationFit& fit, const DeviationFit::Tangents& all,
-                                    const Deviations& prior,
-                                    const std::vector<Deviation>& refused) {
-  const DeviationFit::Tangents alone = all.beyond({});
-  const DeviationFit::Tangents tangents = all.beyond(fit.active());
-  const Deviations least = least_named(fit.steps());
-  const auto is_in = [](const std::vector<Deviation>& list, Deviation d) {
-    return std::find(list.begin(), list.end(), d) != list.end();
-  };
-  std::optional<Deviation> best;
-  double most = kEvidence;
-  for (std::size_t k = 0; k < kDeviations; ++k) {
-    const auto d = static_cast<Deviation>(k);
-    const auto i = static_cast<Eigen::Index>(k);
-    if (is_in(fit.active(), d) || is_in(refused, d)) continue;
-    const double own = tangents.columns.col(i).squaredNorm();
-    if (own < kOwnShare * alone.columns.col(i).squaredNorm()) continue;
-    const Score score = score_of(tangents.residuals, tangents.columns.col(i));
-    if (d == Deviation::kHaze && score.value < 0.0) continue;
-    const double value = score.value * fit.steps()[i];
-    if (std::abs(value) < least[i]) continue;
-    const double far = value / prior[i];
-    const double evidence = score.evidence - far * far;
-    if (evidence <= most) continue;
-    most = evidence;
-    best = d;
+/// Deviations that all scale the way from the surface to the wall: modulo a homography they are the
+/// same to first order, and together they would only cancel.
+bool scales_throw(Deviation deviation) {
+  return deviation == Deviation::kDistance || deviation == Deviation::kLampDistance ||
+         deviation == Deviation::kIndex;
+}
+
+/// Compares all sets of causes at once, linear around a fit, with the view free.
+///
+/// Notation: r what the fit without deviations would leave, C the changes by steps of deviations,
+/// both less what the view could do; P = CᵀC, b = Cᵀr. A set of causes leaves |r|² − 2 v·b + vᵀPv
+/// with v = (P + Λ)⁻¹ b, Λ from the prior. N pixels hold N / τ independent values, τ from the
+/// correlation of what all deviations together leave.
+class JointTest {
+ public:
+  JointTest(const DeviationFit& fit, const Deviations& prior)
+      : steps_(fit.steps()),
+        prior_(prior.cwiseQuotient(steps_)),
+        least_(least_named(steps_).cwiseQuotient(steps_)),
+        limits_(fit.limits()) {
+    const DeviationFit::Tangents tangents = fit.tangents().beyond_view();
+    const Eigen::MatrixXd& columns = tangents.columns;
+    const Eigen::VectorXd rest =
+        tangents.residuals + columns * fit.deviations().cwiseQuotient(steps_);
+    products_ = columns.transpose() * columns;
+    along_ = columns.transpose() * rest;
+    square_ = rest.squaredNorm();
+    variance_ = tangents.residuals.squaredNorm() / fit.samples();
+    std::vector<Deviation> all;
+    for (std::size_t k = 0; k < kDeviations; ++k) {
+      const auto d = static_cast<Deviation>(k);
+      if (products_(index_of(d), index_of(d)) > kFaintest * kFaintest * fit.samples()) {
+        all.push_back(d);
+      }
+    }
+    showing_ = all;
+    const Eigen::VectorXd least = rest - columns * spread(all, values(all));
+    independent_ = fit.samples() / fit.pixels().values_alike(least);
+    variance_ = least.squaredNorm() / independent_;
   }
-  return best;
+
+  [[nodiscard]] const std::vector<Deviation>& showing() const { return showing_; }
+
+  /// True if values, in steps, are within limits and not below what is named.
+  [[nodiscard]] bool named(const std::vector<Deviation>& causes,
+                           const Eigen::VectorXd& values) const {
+    for (std::size_t k = 0; k < causes.size(); ++k) {
+      const Eigen::Index i = index_of(causes[k]);
+      const double value = values[static_cast<Eigen::Index>(k)];
+      if (std::abs(value) < least_[i] || value * steps_[i] > limits_.most[i] ||
+          value * steps_[i] < limits_.least[i]) {
+        return false;
+      }
+    }
+    return std::count_if(causes.begin(), causes.end(), scales_throw) <= 1;
+  }
+
+  /// What speaks against deviations, in steps, beforehand.
+  [[nodiscard]] double cost(const std::vector<Deviation>& causes,
+                            const Eigen::VectorXd& values) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < causes.size(); ++k) {
+      const double share = values[static_cast<Eigen::Index>(k)] / prior_[index_of(causes[k])];
+      sum += kCost + share * share;
+    }
+    return sum;
+  }
+
+  /// By how much the photograph is likelier with a set of causes than with none, less their cost.
+  [[nodiscard]] double evidence(const std::vector<Deviation>& causes) const {
+    const Eigen::VectorXd v = values(causes);
+    const Deviations all = spread(causes, v);
+    const double left = square_ - 2.0 * all.dot(along_) + all.dot(products_ * all);
+    return gain(square_, left) - cost(causes, v);
+  }
+  /// The same, and infinitely less for sets that are not named.
+  [[nodiscard]] double evidence_if_named(const std::vector<Deviation>& causes) const {
+    if (!named(causes, values(causes))) return -std::numeric_limits<double>::infinity();
+    return evidence(causes);
+  }
+  /// The same of sums of squares.
+  [[nodiscard]] double gain(double without, double with) const {
+    return independent_ * std::log(without / std::max(with, 1e-9 * without));
+  }
+
+  /// The set of at most `most` causes with the most evidence; empty if none has any.
+  [[nodiscard]] std::vector<Deviation> best(int most) const {
+    std::vector<Deviation> best;
+    double highest = 0.0;
+    for (unsigned mask = 1; mask < 1U << showing_.size(); ++mask) {
+      if (std::popcount(mask) > most) continue;
+      std::vector<Deviation> causes;
+      for (std::size_t k = 0; k < showing_.size(); ++k) {
+        if (((mask >> k) & 1U) != 0) causes.push_back(showing_[k]);
+      }
+      const double now = evidence_if_named(causes);
+      if (now <= highest) continue;
+      highest = now;
+      best = causes;
+    }
+    return best;
+  }
+
+  /// Standard error of one of these causes, fitted together.
+  [[nodiscard]] double error(const std::vector<Deviation>& causes, Deviation deviation) const {
+    const auto place = std::find(causes.begin(), causes.end(), deviation) - causes.begin();
+    const Eigen::MatrixXd inverse = matrix(causes).inverse();
+    return steps_[index_of(deviation)] * std::sqrt(variance_ * inverse(place, place));
+  }
+
+ private:
+  [[nodiscard]] Eigen::MatrixXd matrix(const std::vector<Deviation>& causes) const {
+    const auto size = std::ssize(causes);
+    Eigen::MatrixXd part(size, size);
+    for (Eigen::Index r = 0; r < size; ++r) {
+      const Eigen::Index i = index_of(causes[static_cast<std::size_t>(r)]);
+      for (Eigen::Index c = 0; c < size; ++c) {
+        part(r, c) = products_(i, index_of(causes[static_cast<std::size_t>(c)]));
+      }
+      part(r, r) += variance_ / (prior_[i] * prior_[i]);
+    }
+    return part;
+  }
+  /// In steps.
+  [[nodiscard]] Eigen::VectorXd values(const std::vector<Deviation>& causes) const {
+    Eigen::VectorXd along(std::ssize(causes));
+    for (std::size_t k = 0; k < causes.size(); ++k) {
+      along[static_cast<Eigen::Index>(k)] = along_[index_of(causes[k])];
+    }
+    if (causes.empty()) return along;
+    return matrix(causes).ldlt().solve(along);
+  }
+  static Deviations spread(const std::vector<Deviation>& causes, const Eigen::VectorXd& values) {
+    Deviations all = Deviations::Zero();
+    for (std::size_t k = 0; k < causes.size(); ++k) {
+      all[index_of(causes[k])] = values[static_cast<Eigen::Index>(k)];
+    }
+    return all;
+  }
+
+  Deviations steps_, prior_, least_;  ///< The last two in steps.
+  DeviationLimits limits_;
+  Eigen::MatrixXd products_;
+  Deviations along_;
+  double square_ = 0.0;
+  double variance_ = 0.0;     ///< Of a pixel, times τ.
+  double independent_ = 0.0;  ///< N / τ
+  std::vector<Deviation> showing_;
+};
+
+/// Values of a fit's active deviations, in steps.
+Eigen::VectorXd active_values(const DeviationFit& fit) {
+  Eigen::VectorXd values(std::ssize(fit.active()));
+  for (std::size_t k = 0; k < fit.active().size(); ++k) {
+    const Eigen::Index i = index_of(fit.active()[k]);
+    values[static_cast<Eigen::Index>(k)] = fit.deviations()[i] / fit.steps()[i];
+  }
+  return values;
 }
 
 /// Evidence, standard error and alternatives of an active deviation.
-FoundCause described(const DeviationFit& fit, const DeviationFit::Tangents& all,
-                     Deviation deviation) {
-  std::vector<Deviation> others = fit.active();
+FoundCause described(const DeviationFit& fit, const JointTest& test, Deviation deviation) {
+  const std::vector<Deviation>& active = fit.active();
+  const double with = test.evidence(active);
+  std::vector<Deviation> others = active;
   std::erase(others, deviation);
-  const DeviationFit::Tangents tangents = all.beyond(others);
-  const Eigen::Index i = index_of(deviation);
-  const Eigen::VectorXd own = tangents.columns.col(i);
-  const double variance = fit.square() / fit.samples();
   FoundCause cause;
   cause.deviation = deviation;
-  cause.value = fit.deviations()[i];
-  cause.error = fit.steps()[i] * std::sqrt(variance / own.squaredNorm());
-  const double steps = cause.value / fit.steps()[i];
-  cause.evidence = fit.samples() * std::log(1.0 + steps * steps * own.squaredNorm() / fit.square());
-  // In its place another one explains the share cos² of what it does.
-  for (std::size_t k = 0; k < kDeviations; ++k) {
-    const auto other = static_cast<Eigen::Index>(k);
-    const Eigen::VectorXd column = tangents.columns.col(other);
-    const double length = column.norm() * own.norm();
-    if (other == i || !(length > 0.0)) continue;
-    const auto d = static_cast<Deviation>(k);
-    if (std::find(fit.active().begin(), fit.active().end(), d) != fit.active().end()) continue;
-    const double cosine = column.dot(own) / length;
-    if ((1.0 - cosine * cosine) * cause.evidence < kAlike) cause.alternatives.push_back(d);
+  cause.value = fit.deviations()[index_of(deviation)];
+  cause.error = test.error(active, deviation);
+  cause.evidence = with - test.evidence(others);
+  for (const Deviation d : test.showing()) {
+    if (std::find(active.begin(), active.end(), d) != active.end()) continue;
+    std::vector<Deviation> instead = others;
+    instead.push_back(d);
+    if ((scales_throw(d) && scales_throw(deviation)) ||
+        test.evidence_if_named(instead) > with - kAlike) {
+      cause.alternatives.push_back(d);
+    }
   }
   return cause;
 }
 
-Deviations standard_errors(const DeviationFit& fit, const DeviationFit::Tangents& all) {
-  const DeviationFit::Tangents tangents = all.beyond(fit.active());
+/// Drops what is below the least that is named; true if there was any.
+bool drop_least(DeviationFit& fit) {
+  const Deviations least = least_named(fit.steps());
+  std::vector<Deviation> kept = fit.active();
+  const auto dropped = std::erase_if(kept, [&](Deviation d) {
+    return std::abs(fit.deviations()[index_of(d)]) < least[index_of(d)];
+  });
+  fit.activate(kept);
+  return dropped > 0;
+}
+
+Deviations standard_errors(const DeviationFit& fit, const JointTest& test) {
   Deviations errors = Deviations::Zero();
-  const double variance = fit.square() / fit.samples();
-  for (Eigen::Index i = 0; i < errors.size(); ++i) {
-    const double square = tangents.columns.col(i).squaredNorm();
-    if (square > kFaintest * kFaintest * fit.samples()) {
-      errors[i] = fit.steps()[i] * std::sqrt(variance / square);
-    }
+  for (const Deviation d : test.showing()) {
+    std::vector<Deviation> causes = fit.active();
+    if (std::find(causes.begin(), causes.end(), d) == causes.end()) causes.push_back(d);
+    errors[index_of(d)] = test.error(causes, d);
   }
   return errors;
 }
@@ -302,31 +417,28 @@ CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eig
                      const RunControl& control) {
   DeviationFit fit(model, pixels, view, control);
   fit.run();
-  DeviationFit::Tangents tangents = fit.tangents();
+  const double without = fit.square();
+  const Deviations prior = prior_of(model);
+  JointTest test(fit, prior);
   CauseFit result;
   result.unexplained = std::sqrt(fit.square() / fit.samples());
-  result.errors = standard_errors(fit, tangents);
-  const Deviations prior = prior_of(model);
-  const Deviations least = least_named(fit.steps());
-  std::vector<Deviation> refused;  // Those that later ones made superfluous.
-  while (fit.active().size() < kMostCauses) {
-    const std::optional<Deviation> next = next_cause(fit, tangents, prior, refused);
-    if (!next) break;
-    fit.activate(*next);
-    fit.run();
-    tangents = fit.tangents();
-    for (const Deviation d : std::vector<Deviation>(fit.active())) {
-      if (described(fit, tangents, d).evidence >= kEvidence &&
-          std::abs(fit.deviations()[index_of(d)]) >= least[index_of(d)]) {
-        continue;
-      }
-      fit.drop(d);
-      refused.push_back(d);
-      fit.run();
-      tangents = fit.tangents();
-    }
+  for (int search = 0; search < kMostSearches; ++search) {
+    const std::vector<Deviation> causes = test.best(std::min(search + 1, kMostCauses));
+    if (causes == fit.active()) break;
+    DeviationFit next = fit;
+    next.activate(causes);
+    next.run();
+    if (drop_least(next)) next.run();
+    const JointTest there(next, prior);
+    const auto evidence = [&](const DeviationFit& of) {
+      return there.gain(without, of.square()) - there.cost(of.active(), active_values(of));
+    };
+    if (!(evidence(next) > evidence(fit))) break;
+    fit = next;
+    test = there;
   }
-  for (const Deviation d : fit.active()) result.found.push_back(described(fit, tangents, d));
+  result.errors = standard_errors(fit, test);
+  for (const Deviation d : fit.active()) result.found.push_back(described(fit, test, d));
   std::sort(result.found.begin(), result.found.end(),
             [](const FoundCause& a, const FoundCause& b) { return a.evidence > b.evidence; });
   result.view = fit.view();

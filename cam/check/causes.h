@@ -15,10 +15,11 @@ struct FoundCause {
   Deviation deviation;
   double value = 0.0;  ///< In the unit of Deviation.
   double error = 0.0;  ///< Standard.
-  /// By how much the photograph is likelier with it: N ln of the ratio of the sums of squared
-  /// residuals of the fits without and with it.
+  /// By how much the photograph is likelier with it, in units of ln likelihood times 2, for as many
+  /// independent values as the correlation of its residuals leaves, less the cost of a cause.
   double evidence = 0.0;
-  /// Deviations that would explain the same nearly as well in its place.
+  /// Deviations that would explain the same nearly as well in its place, or that a photograph
+  /// without a scale cannot tell from it: distance, index and distance of the lamp.
   std::vector<Deviation> alternatives;
 };
 
@@ -27,16 +28,16 @@ struct CauseFit {
   Eigen::VectorXd view;           ///< With the causes.
   Deviations deviations;          ///< 0 but for the causes.
   std::vector<FoundCause> found;  ///< Most evidence first; none: nothing is wrong that shows.
-  Deviations errors;         ///< Standard error of every deviation if it alone were added; 0 if
-                             ///< it does not show.
-  double residual = 0.0;     ///< Root mean square of display values.
-  double unexplained = 0.0;  ///< The same without any cause.
+  Deviations errors;              ///< Standard error of every deviation if it were added; 0 if
+                                  ///< it does not show.
+  double residual = 0.0;          ///< Root mean square of display values.
+  double unexplained = 0.0;       ///< The same without any cause.
 };
 
-/// Finds the causes one after the other: the deviation with the most evidence, less what speaks
-/// against so large a one beforehand (prior_of()), is fitted together with those before it and the
-/// view, by Gauss-Newton steps over pictures that are predicted anew, until no further one has
-/// kEvidence. A cause that lost its evidence to later ones is dropped.
+/// Finds the set of causes with the most evidence, less what speaks against so many and so large
+/// ones beforehand (prior_of()): all sets are compared to first order, the best is fitted together
+/// with the view by Gauss-Newton steps over pictures that are predicted anew, and all are compared
+/// again around it, with one more cause allowed each time, until none is better.
 /// @param view  find_picture()'s. @throw Interrupted
 CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
                      const RunControl& control);

@@ -291,6 +291,22 @@ double SeenPixels::correlation(const Eigen::VectorXd& view, const WallPicture& w
   return length > 0.0 ? (a * b).sum() / length : 0.0;
 }
 
+double SeenPixels::values_alike(const Eigen::VectorXd& residuals) const {
+  constexpr double kMost = 0.9;
+  double product = 0.0;
+  double square = 0.0;
+  for (std::size_t i = 1; i < places_.size(); ++i) {
+    const Eigen::Vector2d way = (places_[i] - places_[i - 1]) / pixel_;
+    if ((way - Eigen::Vector2d::UnitX()).norm() > 0.5) continue;
+    const double left = residuals[static_cast<Eigen::Index>(i) - 1];
+    const double right = residuals[static_cast<Eigen::Index>(i)];
+    product += left * right;
+    square += 0.5 * (left * left + right * right);
+  }
+  const double rho = square > 0.0 ? std::clamp(product / square, 0.0, kMost) : 0.0;
+  return std::pow((1.0 + rho) / (1.0 - rho), 2);
+}
+
 LeastSquares view_problem() {
   LeastSquares problem;
   problem.longest = Eigen::VectorXd::Constant(view::kCount, 0.3);
@@ -325,12 +341,25 @@ struct Moments {
   }
 };
 
-/// Light beyond this share of the brightest counts, so that a dim wall does not.
-constexpr double kCounts = 0.12;
+/// Light beyond this share of the level where the mean of it falls counts, so that a dim wall does
+/// not.
+constexpr double kCounts = 0.3;
+
+/// Level where the mean of an image's light falls: how much dark wall is around does not matter.
+double level_of(const Image& image, double ambient) {
+  double sum = 0.0;
+  double square = 0.0;
+  for (const float value : image.values()) {
+    const double light = std::max(value - ambient, 0.0);
+    sum += light;
+    square += light * light;
+  }
+  return sum > 0.0 ? square / sum : 0.0;
+}
 
 template <class Place>
 Moments moments(const Image& image, double ambient, const Place& place) {
-  const double threshold = ambient + kCounts * (quantile(image, 0.995) - ambient);
+  const double threshold = ambient + kCounts * level_of(image, ambient);
   Moments sum;
   Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
   for (int r = 0; r < image.rows(); ++r) {
@@ -385,7 +414,7 @@ Eigen::VectorXd view_from(const Moments& photo, const Moments& wall, const Eigen
   return view;
 }
 
-WallPicture shrunk(const WallPicture& wall, double columns) {
+WallPicture coarser(const WallPicture& wall, double columns) {
   const double by = std::max(1.0, std::floor(wall.inner_columns() / columns));
   const int margin = static_cast<int>(wall.margin / by);
   if (by == 1.0) return wall;
@@ -457,63 +486,86 @@ void require_light(const Photograph& photo) {
   }
 }
 
-/// Least correlation of the right picture after the search. That of other lenses' pictures is
-/// below 0.7 (CheckBadInput.*).
+/// Least correlation of the right picture after the search.
 constexpr double kSame = 0.8;
 /// By how much another pose must fit better than the upright one: pictures may be symmetric.
 constexpr double kPoseMargin = 0.03;
+
+/// Pixels across the picture while it is searched: edges attract from about one of them, so that
+/// the first are wide.
+constexpr double kFirstAcross = 14.0;
+constexpr double kCoarseAcross = 28.0;
+constexpr double kFineAcross = 56.0;
+
+/// A photograph and a picture of about as many pixels across.
+struct Level {
+  Level(const Photograph& photo_of, const WallPicture& wall_of, const Eigen::VectorXd& view,
+        double across)
+      : photo(shrunk(photo_of, pixels_across(photo_of, view) / across)),
+        wall(coarser(wall_of, across)) {}
+
+  Photograph photo;
+  WallPicture wall;
+};
+
+/// The view of the pose that fits best.
+struct Match {
+  Eigen::VectorXd view;
+  double correlation = -1.0;
+  const char* fault = nullptr;  ///< Pose::fault
+};
+
+Match best_match(const Photograph& photo, const WallPicture& wall) {
+  constexpr double kFirstSide = 160.0;
+  const Photograph small =
+      shrunk(photo, std::max(photo.light.columns(), photo.light.rows()) / kFirstSide);
+  const double ambient = ambient_of(small.light);
+  const Moments seen =
+      moments(small.light, ambient, [&](int c, int r) { return place_of(small.light, c, r); });
+  const Moments shown = moments(wall.light, 0.0, [&](int c, int r) {
+    return Eigen::Vector2d(2.0 * (c + 0.5 - wall.margin) / wall.inner_columns() - 1.0,
+                           2.0 * (r + 0.5 - wall.margin) / wall.inner_rows() - 1.0);
+  });
+  const Eigen::VectorXd even = view_from(seen, shown, Eigen::Matrix2d::Identity());
+  const Level level(photo, wall, even, kFirstAcross);
+  const Level finer(photo, wall, even, kCoarseAcross);
+  const double gain = level_of(small.light, ambient) / level_of(wall.light, 0.0);
+  Match best;
+  double upright = -1.0;
+  for (const Pose& pose : poses()) {
+    Eigen::VectorXd view = view_from(seen, shown, pose.turn);
+    view[view::kGain] = gain;
+    view[view::kAmbient] = ambient;
+    const SeenPixels pixels(level.photo, view, 1.5);
+    view = fit_view(pixels, level.wall, view, with_light(first(6)));
+    view = fit_view(pixels, level.wall, view, with_light(first(8)));
+    const SeenPixels more(finer.photo, view, 1.3);
+    view = fit_view(more, finer.wall, view, with_light(first(8)));
+    const double score = more.correlation(view, finer.wall);
+    if (pose.fault == nullptr) upright = score;
+    const double margin = pose.fault != nullptr && best.correlation == upright ? kPoseMargin : 0.0;
+    if (score > best.correlation + margin) best = {view, score, pose.fault};
+  }
+  return best;
+}
 
 }  // namespace
 
 Eigen::VectorXd find_picture(const Photograph& photo, const WallPicture& wall) {
   require_light(photo);
-  constexpr double kFirstSide = 160.0;
-  const Photograph small =
-      lensforge::shrunk(photo, std::max(photo.light.columns(), photo.light.rows()) / kFirstSide);
-  const double ambient = ambient_of(small.light);
-  const Moments seen =
-      moments(small.light, ambient, [&](int c, int r) { return place_of(small.light, c, r); });
-  const auto place = [&](int c, int r) {
-    return Eigen::Vector2d(2.0 * (c + 0.5 - wall.margin) / wall.inner_columns() - 1.0,
-                           2.0 * (r + 0.5 - wall.margin) / wall.inner_rows() - 1.0);
-  };
-  const Moments shown = moments(wall.light, 0.0, place);
-  const Eigen::VectorXd even = view_from(seen, shown, Eigen::Matrix2d::Identity());
-  constexpr double kCoarse = 28.0;
-  const Photograph coarse = lensforge::shrunk(photo, pixels_across(photo, even) / kCoarse);
-  const WallPicture wall_coarse = shrunk(wall, kCoarse);
-  std::optional<Eigen::VectorXd> best;
-  double best_score = -1.0;
-  double upright = -1.0;
-  const char* fault = nullptr;
-  for (const Pose& pose : poses()) {
-    Eigen::VectorXd view = view_from(seen, shown, pose.turn);
-    view[view::kGain] = (quantile(coarse.light, 0.98) - ambient) / quantile(wall_coarse.light, 0.9);
-    view[view::kAmbient] = ambient;
-    const SeenPixels pixels(coarse, view, 1.5);
-    view = fit_view(pixels, wall_coarse, view, with_light(first(6)));
-    view = fit_view(pixels, wall_coarse, view, with_light(first(8)));
-    const double score = pixels.correlation(view, wall_coarse);
-    if (pose.fault == nullptr) upright = score;
-    if (score > best_score + (pose.fault != nullptr && best_score == upright ? kPoseMargin : 0.0)) {
-      best_score = score;
-      best = view;
-      fault = pose.fault;
-    }
-  }
-  if (best_score < kSame) {
+  const Match match = best_match(photo, wall);
+  if (match.correlation < kSame) {
     throw InputError(photo.name +
                      ": shows another picture than that of this lens: the best match has a "
                      "correlation of " +
-                     decimal_text(best_score, 2) + ", must be 0.8 or more");
+                     decimal_text(match.correlation, 2) + ", must be 0.8 or more");
   }
-  if (fault != nullptr) throw InputError(photo.name + ": " + fault);
-  const Photograph finer = lensforge::shrunk(photo, pixels_across(photo, *best) / (2.0 * kCoarse));
-  const WallPicture wall_finer = shrunk(wall, 2.0 * kCoarse);
-  const SeenPixels pixels(finer, *best, kReach);
-  Eigen::VectorXd view = fit_view(pixels, wall_finer, *best, with_light(first(8)));
-  view = fit_view(pixels, wall_finer, view, with_light(first(10)));
-  return fit_view(pixels, wall_finer, view, first(view::kCount));
+  if (match.fault != nullptr) throw InputError(photo.name + ": " + match.fault);
+  const Level fine(photo, wall, match.view, kFineAcross);
+  const SeenPixels pixels(fine.photo, match.view, kReach);
+  Eigen::VectorXd view = fit_view(pixels, fine.wall, match.view, with_light(first(8)));
+  view = fit_view(pixels, fine.wall, view, with_light(first(10)));
+  return fit_view(pixels, fine.wall, view, first(view::kCount));
 }
 
 double pixels_across(const Photograph& photo, const Eigen::VectorXd& view) {

@@ -96,6 +96,9 @@ class SeenPixels {
   [[nodiscard]] const Eigen::VectorXd& seen() const { return seen_; }
   /// Correlation of both over pixels that see the rectangle itself.
   [[nodiscard]] double correlation(const Eigen::VectorXd& view, const WallPicture& wall) const;
+  /// Pixels per independent value of residuals: ((1 + ρ) / (1 − ρ))², ρ their correlation from a
+  /// pixel to its right neighbour, as of a first-order process along both axes; at least 1.
+  [[nodiscard]] double values_alike(const Eigen::VectorXd& residuals) const;
 
  private:
   [[nodiscard]] WallPicture::Light seen_light(const Eigen::VectorXd& view, const WallPicture& wall,

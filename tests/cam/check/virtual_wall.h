@@ -14,9 +14,11 @@
 #include "core/image/image.h"
 #include "core/lens/lens.h"
 
-/// A workshop, a lamp, a wall and a camera that do not exist, for tests of `check`. Nothing here is
-/// shared with its fit: the light is that of cam's chain of surfaces (MilledField, PolishedField,
-/// render_field()) under many points of a lamp, the camera a pinhole with Brown's distortion.
+/// A workshop, a lamp, a wall and a camera that do not exist, for tests of `check`. What faults do
+/// is not shared with its fit: here the paths are cut anew, polished and rendered by cam's chain
+/// (MilledField, PolishedField, render_field()) under many points of a lamp; the fit moves the
+/// picture of PartModel. Without faults both rest on that chain and the same planned rows, so that
+/// errors of the forecast itself do not show. The camera is a pinhole with Brown's distortion.
 namespace lensforge::virtual_wall {
 
 /// What is wrong. All 0: nothing.

@@ -90,11 +90,12 @@ TEST(WallView, DerivativesAreThoseOfDifferences) {
 /// From any side up to 30°, distorted, vignetted, in a lit room.
 TEST(WallView, FindsThePictureFromAnySide) {
   const WallPicture wall = spots();
-  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 7, 8}) {
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6, 7, 8}) {
     SCOPED_TRACE(seed);
     const Photograph photo = shot(wall, virtual_wall::any_camera(seed));
     const Eigen::VectorXd view = find_picture(photo, wall);
-    const SeenPixels pixels(photo, view, 1.1);
+    // Within the rim: it is sharper than pixels, and what is beyond it nearly black.
+    const SeenPixels pixels(photo, view, 0.95);
     EXPECT_GT(pixels.correlation(view, wall), 0.99);
     const double rms = (pixels.shown(view, wall) - pixels.seen()).norm() /
                        std::sqrt(static_cast<double>(pixels.size()));
