@@ -201,6 +201,14 @@ double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, dou
   return (light / falloff_of(view, pixel) - room_of(view, pixel)) / view[view::kGain];
 }
 
+namespace {
+
+/// Light added to both sides before they are compared: below some hundredths of white a camera's
+/// black level and the prediction's stray light are no better than that, and sRGB is steep.
+constexpr double kToe = 0.02;
+
+}  // namespace
+
 SeenPixels::SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, double reach)
     : pixel_(1.0 / half_diagonal(photo.light)) {
   std::vector<double> seen;
@@ -210,7 +218,7 @@ SeenPixels::SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, dou
       if (!photo.is_usable(c, r)) continue;
       if (!(wall_of(view, place).lpNorm<Eigen::Infinity>() < reach)) continue;
       places_.push_back(place);
-      seen.push_back(encode(photo.light.at(c, r)));
+      seen.push_back(encode(kToe + photo.light.at(c, r)));
     }
   }
   seen_ = Eigen::Map<const Eigen::VectorXd>(seen.data(), std::ssize(seen));
@@ -235,9 +243,9 @@ Eigen::VectorXd SeenPixels::shown(const Eigen::VectorXd& view, const WallPicture
   Eigen::VectorXd shown(size());
   for (Eigen::Index i = 0; i < size(); ++i) {
     const Eigen::Vector2d& place = places_[static_cast<std::size_t>(i)];
-    shown[i] =
-        encode(falloff_of(view, place) *
-               (view[view::kGain] * seen_light(view, wall, place).value + room_of(view, place)));
+    shown[i] = encode(kToe + falloff_of(view, place) *
+                                 (view[view::kGain] * seen_light(view, wall, place).value +
+                                  room_of(view, place)));
   }
   return shown;
 }
@@ -250,7 +258,7 @@ Eigen::MatrixXd SeenPixels::derivatives(const Eigen::VectorXd& view,
     const WallPicture::Light light = seen_light(view, wall, x);
     const double falloff = falloff_of(view, x);
     const double lit = view[view::kGain] * light.value + room_of(view, x);
-    const double slope = encode_slope(falloff * lit);
+    const double slope = encode_slope(kToe + falloff * lit);
     const double r2 = x.squaredNorm();
     const Eigen::Vector2d y =
         x * (1.0 + r2 * (view[view::kDistortion] + r2 * view[view::kDistortion + 1]));

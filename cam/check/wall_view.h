@@ -78,7 +78,8 @@ Eigen::Vector2d wall_of(const Eigen::VectorXd& view, const Eigen::Vector2d& pixe
 /// Light p of the wall's picture from that of a pixel. @param pixel  X.
 double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, double light);
 
-/// Pixels of a photograph that see the wall around a picture, and their light.
+/// Pixels of a photograph that see the wall around a picture, and their light. Display values are
+/// sRGB's of 2 % of white more than the light.
 class SeenPixels {
  public:
   /// Pixels whose wall lies within `reach` (1: the rectangle itself) by this view.
