@@ -13,11 +13,9 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
-#include "core/io/lens_folder.h"
 #include "core/lens/lens.h"
 #include "core/schema/toml.h"
 #include "core/text/words.h"
-#include "design/design.h"
 
 namespace lensforge::app {
 namespace {
@@ -48,7 +46,7 @@ void describe(Description& d, CheckSettings& settings) {
          "the workshop that made the part; without it the default one");
   d.text("--fit", settings.fit, "FILE.toml",
          "write the workshop with what the photograph tells of polish, finishing ball, pitch error "
-         "and haze");
+         "and haze, where it can tell them from other causes");
   d.flag("--force", settings.force, "replace files that lensforge did not write");
 }
 
@@ -81,6 +79,28 @@ std::string workshop_text(const CheckSettings& settings, const Workshop& fitted)
   return workshop_toml(fitted);
 }
 
+std::vector<std::string> warnings_of(const CheckSettings& settings, const Lens& lens,
+                                     const CheckResult& result) {
+  constexpr double kFewest = 1.5;
+  std::vector<std::string> warnings;
+  if (!result.part) {
+    warnings.push_back("the forecast is that of the lens as designed: lensforge " + result.fault);
+  }
+  const double pixels = result.seen_pixels / lens.setup.pixels.x();
+  if (pixels < kFewest) {
+    warnings.push_back("the photograph has " + fixed(pixels, 1) +
+                       " pixels per pixel of the picture, 1.5 or more tell causes better; go "
+                       "nearer");
+  }
+  if (settings.fit.empty()) return warnings;
+  for (const FoundCause& cause : result.fit.found) {
+    if (cause.alternatives.empty()) continue;
+    warnings.push_back("--fit leaves out what a photograph cannot tell from other causes: " +
+                       words_of(cause, lens, settings.cam));
+  }
+  return warnings;
+}
+
 CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   if (!settings.workshop.empty()) settings.cam.workshop = read_workshop(settings.workshop);
   const Lens lens = read_lens(settings.source);
@@ -109,14 +129,10 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   }
   text += "  MAE against the target " + fixed(result.to_target.metrics.mae, 4) +
           ", against the forecast " + fixed(result.to_forecast.metrics.mae, 4) + "\n";
-  std::vector<std::string> warnings;
-  if (!result.part) {
-    warnings.push_back("the forecast is that of the lens as designed: lensforge " + result.fault);
-  }
   return {json,
           text,
           kDone,
-          std::move(warnings),
+          warnings_of(settings, lens, result),
           {"look at " + (fs::path(settings.out) / check_file::kReport).string()}};
 }
 

@@ -15,9 +15,8 @@
 namespace lensforge {
 namespace {
 
-/// Evidence that every cause must add: some three times ln N, as in the Bayesian information
-/// criterion, since predictions have errors of their own.
-constexpr double kCost = 30.0;
+/// Evidence that every cause must add: a deviation of some 3.5 standard errors.
+constexpr double kCost = 12.0;
 /// Evidence that an alternative may lack.
 constexpr double kAlike = 12.0;
 constexpr int kMostCauses = 4;
@@ -86,6 +85,17 @@ class DeviationFit {
   /// Change of the picture by one step.
   [[nodiscard]] Image change(Deviation deviation, const Image& from) const;
 
+  /// Pictures by the view and steps of active deviations, in that order: linear in these.
+  struct Line {
+    WallPicture base;
+    std::vector<Image> changes;
+
+    [[nodiscard]] WallPicture at(const Eigen::VectorXd& parameters) const;
+  };
+  [[nodiscard]] LeastSquares problem(const Line& line) const;
+  /// Goes to such parameters. @return the longest step of a deviation.
+  double take(const Eigen::VectorXd& parameters);
+
   const WallModel* model_;
   const SeenPixels* pixels_;
   const RunControl* control_;
@@ -107,55 +117,62 @@ Image DeviationFit::change(Deviation deviation, const Image& from) const {
   return change;
 }
 
-void DeviationFit::run() {
-  const int count = view::kCount + static_cast<int>(active_.size());
+WallPicture DeviationFit::Line::at(const Eigen::VectorXd& parameters) const {
+  WallPicture picture = base;
+  for (std::size_t k = 0; k < changes.size(); ++k) {
+    const double by = parameters[view::kCount + static_cast<Eigen::Index>(k)];
+    if (by != 0.0) picture.light = sum_of(picture.light, by, changes[k]);
+  }
+  return picture;
+}
+
+LeastSquares DeviationFit::problem(const Line& line) const {
+  const auto count = view::kCount + std::ssize(line.changes);
   LeastSquares problem = view_problem();
   problem.longest.conservativeResize(count);
-  problem.longest.tail(std::ssize(active_)).setConstant(3.0);
+  problem.longest.tail(std::ssize(line.changes)).setConstant(3.0);
   problem.free.resize(static_cast<std::size_t>(count));
   std::iota(problem.free.begin(), problem.free.end(), 0);
-  for (int round = 0; round < kMostRounds; ++round) {
-    const WallPicture base = wall(at_);
-    std::vector<Image> changes;
-    for (const Deviation d : active_) changes.push_back(change(d, base.light));
-    const auto moved = [&](const Eigen::VectorXd& p) {
-      WallPicture picture = base;
-      for (std::size_t k = 0; k < changes.size(); ++k) {
-        const double by = p[view::kCount + static_cast<Eigen::Index>(k)];
-        if (by != 0.0) picture.light = sum_of(picture.light, by, changes[k]);
-      }
-      return picture;
-    };
-    problem.residuals = [&](const Eigen::VectorXd& p) {
-      return Eigen::VectorXd(pixels_->shown(p.head(view::kCount), moved(p)) - pixels_->seen());
-    };
-    problem.derivatives = [&](const Eigen::VectorXd& p) {
-      const WallPicture now = moved(p);
-      const Eigen::VectorXd view = p.head(view::kCount);
-      const Eigen::VectorXd shown = pixels_->shown(view, now);
-      Eigen::MatrixXd rows = pixels_->derivatives(view, now);
-      rows.conservativeResize(Eigen::NoChange, count);
-      for (std::size_t k = 0; k < changes.size(); ++k) {
-        constexpr double kStep = 0.1;
-        const WallPicture beyond{sum_of(now.light, kStep, changes[k]), now.margin};
-        rows.col(view::kCount + static_cast<Eigen::Index>(k)) =
-            (pixels_->shown(view, beyond) - shown) / kStep;
-      }
-      return rows;
-    };
-    Eigen::VectorXd start = Eigen::VectorXd::Zero(count);
-    start.head(view::kCount) = view_;
-    const Eigen::VectorXd end = minimize(problem, start);
-    view_ = end.head(view::kCount);
-    double longest = 0.0;
-    for (std::size_t k = 0; k < active_.size(); ++k) {
-      const Eigen::Index i = index_of(active_[k]);
-      const double before = at_[i];
-      at_[i] = std::clamp(before + end[view::kCount + static_cast<Eigen::Index>(k)] * steps_[i],
-                          limits_.least[i], limits_.most[i]);
-      longest = std::max(longest, std::abs(at_[i] - before) / steps_[i]);
+  problem.residuals = [this, &line](const Eigen::VectorXd& p) {
+    return Eigen::VectorXd(pixels_->shown(p.head(view::kCount), line.at(p)) - pixels_->seen());
+  };
+  problem.derivatives = [this, &line, count](const Eigen::VectorXd& p) {
+    constexpr double kStep = 0.1;
+    const WallPicture now = line.at(p);
+    const Eigen::VectorXd view = p.head(view::kCount);
+    const Eigen::VectorXd shown = pixels_->shown(view, now);
+    Eigen::MatrixXd rows = pixels_->derivatives(view, now);
+    rows.conservativeResize(Eigen::NoChange, count);
+    for (std::size_t k = 0; k < line.changes.size(); ++k) {
+      const WallPicture beyond{sum_of(now.light, kStep, line.changes[k]), now.margin};
+      rows.col(view::kCount + static_cast<Eigen::Index>(k)) =
+          (pixels_->shown(view, beyond) - shown) / kStep;
     }
-    if (longest < kShortStep) break;
+    return rows;
+  };
+  return problem;
+}
+
+double DeviationFit::take(const Eigen::VectorXd& parameters) {
+  view_ = parameters.head(view::kCount);
+  double longest = 0.0;
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    const Eigen::Index i = index_of(active_[k]);
+    const double before = at_[i];
+    const double by = steps_[i] * parameters[view::kCount + static_cast<Eigen::Index>(k)];
+    at_[i] = std::clamp(before + by, limits_.least[i], limits_.most[i]);
+    longest = std::max(longest, std::abs(at_[i] - before) / steps_[i]);
+  }
+  return longest;
+}
+
+void DeviationFit::run() {
+  for (int round = 0; round < kMostRounds; ++round) {
+    Line line{wall(at_), {}};
+    for (const Deviation d : active_) line.changes.push_back(change(d, line.base.light));
+    Eigen::VectorXd start = Eigen::VectorXd::Zero(view::kCount + std::ssize(active_));
+    start.head(view::kCount) = view_;
+    if (take(minimize(problem(line), start)) < kShortStep) break;
   }
   square_ = (pixels_->shown(view_, wall(at_)) - pixels_->seen()).squaredNorm();
 }
@@ -187,12 +204,22 @@ DeviationFit::Tangents DeviationFit::Tangents::beyond_view() const {
 
 constexpr double kFaintest = 1e-6;  ///< Change per step of a display value, rms, that counts as 0.
 
-/// Smaller deviations are not named: neither are cameras and predictions better.
-Deviations least_named(const Deviations& steps) {
-  Deviations least;
-  least << 0.004, 0.012, 0.012, 0.12 * steps[index_of(Deviation::kLampSize)], 0.004, 0.003, 0.05,
-      0.04, 0.0007, 0.02;
-  return least;
+/// Standard deviation with which a deviation occurs, about; of what a workshop's tolerances state,
+/// theirs would be too small: a photograph is checked because something is wrong.
+Deviations prior_of(const Deviations& steps) {
+  Deviations prior;
+  prior << 0.03, 0.05, 0.05, 4.0 * steps[index_of(Deviation::kLampSize)], 0.01, 0.003, 0.3, 0.1,
+      0.005, 0.1;
+  return prior;
+}
+
+/// Standard deviation of what is found of a deviation where nothing is wrong: cameras and
+/// predictions are no better. docs/check.md says how it was measured.
+Deviations model_error(const Deviations& steps) {
+  Deviations error;
+  error << 0.0013, 0.003, 0.003, 0.13 * steps[index_of(Deviation::kLampSize)], 0.0013, 0.0014, 0.01,
+      0.01, 0.0004, 0.006;
+  return error;
 }
 
 /// Deviations that all scale the way from the surface to the wall: modulo a homography they are the
@@ -205,79 +232,42 @@ bool scales_throw(Deviation deviation) {
 /// Compares all sets of causes at once, linear around a fit, with the view free.
 ///
 /// Notation: r what the fit without deviations would leave, C the changes by steps of deviations,
-/// both less what the view could do; P = CᵀC, b = Cᵀr. A set of causes leaves |r|² − 2 v·b + vᵀPv
-/// with v = (P + Λ)⁻¹ b, Λ from the prior. N pixels hold N / τ independent values, τ from the
-/// correlation of what all deviations together leave.
+/// both less what the view could do; P = CᵀC, b = Cᵀr. Any deviation v is normal with the variance
+/// w of model_error(), and that of prior_of() besides if it is among the causes. A set of causes
+/// then has the least of |r − C v|² / s² + Σ v² / w, at v = (P + s² W⁻¹)⁻¹ b. s² is the variance of
+/// a pixel times τ: N pixels hold N / τ independent values, by what all deviations together leave.
 class JointTest {
  public:
-  JointTest(const DeviationFit& fit, const Deviations& prior)
-      : steps_(fit.steps()),
-        prior_(prior.cwiseQuotient(steps_)),
-        least_(least_named(steps_).cwiseQuotient(steps_)),
-        limits_(fit.limits()) {
+  explicit JointTest(const DeviationFit& fit) : steps_(fit.steps()), limits_(fit.limits()) {
+    const Deviations own = model_error(steps_).cwiseQuotient(steps_);
+    const Deviations prior = prior_of(steps_).cwiseQuotient(steps_);
+    own_ = own.cwiseAbs2();
+    prior_ = prior.cwiseAbs2();
     const DeviationFit::Tangents tangents = fit.tangents().beyond_view();
     const Eigen::MatrixXd& columns = tangents.columns;
     const Eigen::VectorXd rest =
         tangents.residuals + columns * fit.deviations().cwiseQuotient(steps_);
     products_ = columns.transpose() * columns;
     along_ = columns.transpose() * rest;
-    square_ = rest.squaredNorm();
-    variance_ = tangents.residuals.squaredNorm() / fit.samples();
-    std::vector<Deviation> all;
     for (std::size_t k = 0; k < kDeviations; ++k) {
       const auto d = static_cast<Deviation>(k);
       if (products_(index_of(d), index_of(d)) > kFaintest * kFaintest * fit.samples()) {
-        all.push_back(d);
+        showing_.push_back(d);
       }
     }
-    showing_ = all;
-    const Eigen::VectorXd least = rest - columns * spread(all, values(all));
-    independent_ = fit.samples() / fit.pixels().values_alike(least);
-    variance_ = least.squaredNorm() / independent_;
+    variance_ = tangents.residuals.squaredNorm() / fit.samples();
+    const Eigen::VectorXd least = rest - columns * estimate(showing_).steps;
+    variance_ = least.squaredNorm() / fit.samples() * fit.pixels().values_alike(least);
   }
 
   [[nodiscard]] const std::vector<Deviation>& showing() const { return showing_; }
 
-  /// True if values, in steps, are within limits and not below what is named.
-  [[nodiscard]] bool named(const std::vector<Deviation>& causes,
-                           const Eigen::VectorXd& values) const {
-    for (std::size_t k = 0; k < causes.size(); ++k) {
-      const Eigen::Index i = index_of(causes[k]);
-      const double value = values[static_cast<Eigen::Index>(k)];
-      if (std::abs(value) < least_[i] || value * steps_[i] > limits_.most[i] ||
-          value * steps_[i] < limits_.least[i]) {
-        return false;
-      }
-    }
-    return std::count_if(causes.begin(), causes.end(), scales_throw) <= 1;
-  }
-
-  /// What speaks against deviations, in steps, beforehand.
-  [[nodiscard]] double cost(const std::vector<Deviation>& causes,
-                            const Eigen::VectorXd& values) const {
-    double sum = 0.0;
-    for (std::size_t k = 0; k < causes.size(); ++k) {
-      const double share = values[static_cast<Eigen::Index>(k)] / prior_[index_of(causes[k])];
-      sum += kCost + share * share;
-    }
-    return sum;
-  }
-
-  /// By how much the photograph is likelier with a set of causes than with none, less their cost.
+  /// By how much a photograph is likelier, in ln likelihood times 2, with a set of causes than with
+  /// none, less their cost; infinitely less for sets that are not named.
   [[nodiscard]] double evidence(const std::vector<Deviation>& causes) const {
-    const Eigen::VectorXd v = values(causes);
-    const Deviations all = spread(causes, v);
-    const double left = square_ - 2.0 * all.dot(along_) + all.dot(products_ * all);
-    return gain(square_, left) - cost(causes, v);
-  }
-  /// The same, and infinitely less for sets that are not named.
-  [[nodiscard]] double evidence_if_named(const std::vector<Deviation>& causes) const {
-    if (!named(causes, values(causes))) return -std::numeric_limits<double>::infinity();
-    return evidence(causes);
-  }
-  /// The same of sums of squares.
-  [[nodiscard]] double gain(double without, double with) const {
-    return independent_ * std::log(without / std::max(with, 1e-9 * without));
+    const Estimate with = estimate(causes);
+    if (!named(causes, with.steps)) return -std::numeric_limits<double>::infinity();
+    return with.gain - estimate({}).gain - kCost * static_cast<double>(causes.size());
   }
 
   /// The set of at most `most` causes with the most evidence; empty if none has any.
@@ -290,7 +280,7 @@ class JointTest {
       for (std::size_t k = 0; k < showing_.size(); ++k) {
         if (((mask >> k) & 1U) != 0) causes.push_back(showing_[k]);
       }
-      const double now = evidence_if_named(causes);
+      const double now = evidence(causes);
       if (now <= highest) continue;
       highest = now;
       best = causes;
@@ -298,62 +288,54 @@ class JointTest {
     return best;
   }
 
-  /// Standard error of one of these causes, fitted together.
-  [[nodiscard]] double error(const std::vector<Deviation>& causes, Deviation deviation) const {
-    const auto place = std::find(causes.begin(), causes.end(), deviation) - causes.begin();
-    const Eigen::MatrixXd inverse = matrix(causes).inverse();
-    return steps_[index_of(deviation)] * std::sqrt(variance_ * inverse(place, place));
+  /// A value and its standard error.
+  struct Value {
+    double value = 0.0;
+    double error = 0.0;
+  };
+  /// Of one of these causes.
+  [[nodiscard]] Value value(const std::vector<Deviation>& causes, Deviation deviation) const {
+    const Eigen::Index i = index_of(deviation);
+    const Estimate with = estimate(causes);
+    return {steps_[i] * with.steps[i], steps_[i] * std::sqrt(with.variances[i] + own_[i])};
   }
 
  private:
-  [[nodiscard]] Eigen::MatrixXd matrix(const std::vector<Deviation>& causes) const {
-    const auto size = std::ssize(causes);
-    Eigen::MatrixXd part(size, size);
-    for (Eigen::Index r = 0; r < size; ++r) {
-      const Eigen::Index i = index_of(causes[static_cast<std::size_t>(r)]);
-      for (Eigen::Index c = 0; c < size; ++c) {
-        part(r, c) = products_(i, index_of(causes[static_cast<std::size_t>(c)]));
-      }
-      part(r, r) += variance_ / (prior_[i] * prior_[i]);
-    }
-    return part;
-  }
-  /// In steps.
-  [[nodiscard]] Eigen::VectorXd values(const std::vector<Deviation>& causes) const {
-    Eigen::VectorXd along(std::ssize(causes));
-    for (std::size_t k = 0; k < causes.size(); ++k) {
-      along[static_cast<Eigen::Index>(k)] = along_[index_of(causes[k])];
-    }
-    if (causes.empty()) return along;
-    return matrix(causes).ldlt().solve(along);
-  }
-  static Deviations spread(const std::vector<Deviation>& causes, const Eigen::VectorXd& values) {
-    Deviations all = Deviations::Zero();
-    for (std::size_t k = 0; k < causes.size(); ++k) {
-      all[index_of(causes[k])] = values[static_cast<Eigen::Index>(k)];
-    }
-    return all;
+  struct Estimate {
+    Deviations steps;
+    Deviations variances;
+    double gain = 0.0;  ///< |r|² / s² less the least sum.
+  };
+  [[nodiscard]] Estimate estimate(const std::vector<Deviation>& causes) const {
+    Deviations weights = own_;
+    for (const Deviation d : causes) weights[index_of(d)] += prior_[index_of(d)];
+    Eigen::MatrixXd matrix = products_ / variance_;
+    matrix.diagonal() += weights.cwiseInverse();
+    const Eigen::MatrixXd inverse = matrix.inverse();
+    Estimate result;
+    result.steps = inverse * along_ / variance_;
+    result.variances = inverse.diagonal();
+    result.gain = result.steps.dot(along_) / variance_;
+    return result;
   }
 
-  Deviations steps_, prior_, least_;  ///< The last two in steps.
+  /// True if values, in steps, are within limits, and one cause at most scales the throw.
+  [[nodiscard]] bool named(const std::vector<Deviation>& causes, const Deviations& values) const {
+    for (const Deviation d : causes) {
+      const double value = values[index_of(d)] * steps_[index_of(d)];
+      if (value > limits_.most[index_of(d)] || value < limits_.least[index_of(d)]) return false;
+    }
+    return std::count_if(causes.begin(), causes.end(), scales_throw) <= 1;
+  }
+
+  Deviations steps_;
+  Deviations own_, prior_;  ///< Variances of model_error() and prior_of(), in steps.
   DeviationLimits limits_;
   Eigen::MatrixXd products_;
   Deviations along_;
-  double square_ = 0.0;
-  double variance_ = 0.0;     ///< Of a pixel, times τ.
-  double independent_ = 0.0;  ///< N / τ
+  double variance_ = 0.0;  ///< s²
   std::vector<Deviation> showing_;
 };
-
-/// Values of a fit's active deviations, in steps.
-Eigen::VectorXd active_values(const DeviationFit& fit) {
-  Eigen::VectorXd values(std::ssize(fit.active()));
-  for (std::size_t k = 0; k < fit.active().size(); ++k) {
-    const Eigen::Index i = index_of(fit.active()[k]);
-    values[static_cast<Eigen::Index>(k)] = fit.deviations()[i] / fit.steps()[i];
-  }
-  return values;
-}
 
 /// Evidence, standard error and alternatives of an active deviation.
 FoundCause described(const DeviationFit& fit, const JointTest& test, Deviation deviation) {
@@ -364,39 +346,29 @@ FoundCause described(const DeviationFit& fit, const JointTest& test, Deviation d
   FoundCause cause;
   cause.deviation = deviation;
   cause.value = fit.deviations()[index_of(deviation)];
-  cause.error = test.error(active, deviation);
+  cause.error = test.value(active, deviation).error;
   cause.evidence = with - test.evidence(others);
   for (const Deviation d : test.showing()) {
     if (std::find(active.begin(), active.end(), d) != active.end()) continue;
     std::vector<Deviation> instead = others;
     instead.push_back(d);
-    if ((scales_throw(d) && scales_throw(deviation)) ||
-        test.evidence_if_named(instead) > with - kAlike) {
+    if ((scales_throw(d) && scales_throw(deviation)) || test.evidence(instead) > with - kAlike) {
       cause.alternatives.push_back(d);
     }
   }
   return cause;
 }
 
-/// Drops what is below the least that is named; true if there was any.
-bool drop_least(DeviationFit& fit) {
-  const Deviations least = least_named(fit.steps());
-  std::vector<Deviation> kept = fit.active();
-  const auto dropped = std::erase_if(kept, [&](Deviation d) {
-    return std::abs(fit.deviations()[index_of(d)]) < least[index_of(d)];
-  });
-  fit.activate(kept);
-  return dropped > 0;
-}
-
-Deviations standard_errors(const DeviationFit& fit, const JointTest& test) {
-  Deviations errors = Deviations::Zero();
+/// What each deviation would be if it were added to the causes.
+void describe_all(const DeviationFit& fit, const JointTest& test, CauseFit& result) {
   for (const Deviation d : test.showing()) {
     std::vector<Deviation> causes = fit.active();
-    if (std::find(causes.begin(), causes.end(), d) == causes.end()) causes.push_back(d);
-    errors[index_of(d)] = test.error(causes, d);
+    const bool active = std::find(causes.begin(), causes.end(), d) != causes.end();
+    if (!active) causes.push_back(d);
+    const JointTest::Value value = test.value(causes, d);
+    result.alone[index_of(d)] = active ? fit.deviations()[index_of(d)] : value.value;
+    result.errors[index_of(d)] = value.error;
   }
-  return errors;
 }
 
 }  // namespace
@@ -405,21 +377,11 @@ WallPicture wall_picture(const WallModel& model, const Deviations& deviations) {
   return {model.picture(deviations), model.margin() * model.fine()};
 }
 
-Deviations prior_of(const WallModel& model) {
-  const Deviations steps = deviation_steps(model.lens().setup);
-  Deviations prior;
-  prior << 0.03, 0.05, 0.05, 4.0 * steps[index_of(Deviation::kLampSize)], 0.01, 0.003, 0.3, 0.1,
-      0.005, 0.1;
-  return prior;
-}
-
 CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
                      const RunControl& control) {
   DeviationFit fit(model, pixels, view, control);
   fit.run();
-  const double without = fit.square();
-  const Deviations prior = prior_of(model);
-  JointTest test(fit, prior);
+  JointTest test(fit);
   CauseFit result;
   result.unexplained = std::sqrt(fit.square() / fit.samples());
   for (int search = 0; search < kMostSearches; ++search) {
@@ -428,16 +390,12 @@ CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eig
     DeviationFit next = fit;
     next.activate(causes);
     next.run();
-    if (drop_least(next)) next.run();
-    const JointTest there(next, prior);
-    const auto evidence = [&](const DeviationFit& of) {
-      return there.gain(without, of.square()) - there.cost(of.active(), active_values(of));
-    };
-    if (!(evidence(next) > evidence(fit))) break;
+    const JointTest there(next);
+    if (!(there.evidence(causes) > std::max(there.evidence(fit.active()), 0.0))) break;
     fit = next;
     test = there;
   }
-  result.errors = standard_errors(fit, test);
+  describe_all(fit, test, result);
   for (const Deviation d : fit.active()) result.found.push_back(described(fit, test, d));
   std::sort(result.found.begin(), result.found.end(),
             [](const FoundCause& a, const FoundCause& b) { return a.evidence > b.evidence; });

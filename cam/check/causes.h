@@ -15,8 +15,8 @@ struct FoundCause {
   Deviation deviation;
   double value = 0.0;  ///< In the unit of Deviation.
   double error = 0.0;  ///< Standard.
-  /// By how much the photograph is likelier with it, in units of ln likelihood times 2, for as many
-  /// independent values as the correlation of its residuals leaves, less the cost of a cause.
+  /// By how much the photograph is likelier with it, in ln likelihood times 2, less the cost of a
+  /// cause.
   double evidence = 0.0;
   /// Deviations that would explain the same nearly as well in its place, or that a photograph
   /// without a scale cannot tell from it: distance, index and distance of the lamp.
@@ -28,23 +28,20 @@ struct CauseFit {
   Eigen::VectorXd view;           ///< With the causes.
   Deviations deviations;          ///< 0 but for the causes.
   std::vector<FoundCause> found;  ///< Most evidence first; none: nothing is wrong that shows.
-  Deviations errors;              ///< Standard error of every deviation if it were added; 0 if
-                                  ///< it does not show.
-  double residual = 0.0;          ///< Root mean square of display values.
-  double unexplained = 0.0;       ///< The same without any cause.
+  /// What every deviation would be if it were added to the causes, and its standard error; 0 if it
+  /// does not show.
+  Deviations alone = Deviations::Zero(), errors = Deviations::Zero();
+  double residual = 0.0;     ///< Root mean square of display values.
+  double unexplained = 0.0;  ///< The same without any cause.
 };
 
 /// Finds the set of causes with the most evidence, less what speaks against so many and so large
-/// ones beforehand (prior_of()): all sets are compared to first order, the best is fitted together
-/// with the view by Gauss-Newton steps over pictures that are predicted anew, and all are compared
-/// again around it, with one more cause allowed each time, until none is better.
+/// ones beforehand: all sets are compared to first order, the best is fitted together with the view
+/// by Gauss-Newton steps over pictures that are predicted anew, and all are compared again around
+/// it, with one more cause allowed each time, until none is better.
 /// @param view  find_picture()'s. @throw Interrupted
 CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
                      const RunControl& control);
-
-/// Standard deviation with which a deviation occurs, about; of what a workshop's tolerances state,
-/// theirs would be too small: a photograph is checked because something is wrong.
-Deviations prior_of(const WallModel& model);
 
 /// A predicted picture of the model for a view.
 WallPicture wall_picture(const WallModel& model, const Deviations& deviations);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "cam/plan/finishing.h"
@@ -103,28 +104,23 @@ double clipped_share(const Photograph& photo, const Eigen::VectorXd& view, const
   return clipped / (1.0 * target.columns() * target.rows());
 }
 
-Image blurred(const Image& image, double deviation, const Executor& executor) {
+/// A picture blurred by a Gaussian. @param deviation  standard, pixels.
+Image blurred_by(const Image& image, double deviation) {
   if (deviation == 0.0) return image;
-  const std::vector<double> light(image.values().begin(), image.values().end());
-  const Eigen::Vector2i pixels(image.columns(), image.rows());
-  Haze all;
-  all.share = 1.0;
-  all.deviation = {deviation, deviation};
-  const std::vector<double> even(light.size(), 1.0);
-  const std::vector<double> sum = hazed(all, light, pixels, executor);
-  const std::vector<double> inside = hazed(all, even, pixels, executor);
-  Image result(image.columns(), image.rows());
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    result.values()[i] = static_cast<float>(sum[i] / inside[i]);
+  std::vector<double> shares{1.0};
+  for (int k = 1; k <= 4.0 * deviation; ++k) {
+    shares.push_back(std::exp(-0.5 * k * k / (deviation * deviation)));
   }
-  return result;
+  const double all = 2.0 * std::accumulate(shares.begin(), shares.end(), 0.0) - 1.0;
+  for (double& share : shares) share /= all;
+  return blurred(image, shares, Beyond::kMirrored);
 }
 
 /// Golden section over the blur's deviation.
-Likeness likeness(const Image& seen, const Image& other, const Executor& executor) {
+Likeness likeness(const Image& seen, const Image& other) {
   constexpr double kMostBlur = 6.0;  // Pixels.
   constexpr int kSteps = 16;
-  const auto mae = [&](double blur) { return compare(seen, blurred(other, blur, executor)).mae; };
+  const auto mae = [&](double blur) { return compare(seen, blurred_by(other, blur)).mae; };
   Likeness result;
   result.metrics = compare(seen, other);
   double low = 0.0;
@@ -139,12 +135,17 @@ Likeness likeness(const Image& seen, const Image& other, const Executor& executo
   }
   const double best = 0.5 * (low + high);
   if (mae(best) < result.metrics.mae) result.blur = best;
-  result.blurred = compare(seen, blurred(other, result.blur, executor));
+  result.blurred = compare(seen, blurred_by(other, result.blur));
   return result;
 }
 
+/// As many decimals as the error deserves: "0.80 ± 0.08", "31.2 ± 1.3".
 std::string plus_minus(double value, double error, const std::string& unit) {
-  return number_text(value, 3) + " ± " + number_text(error, 1) + unit;
+  constexpr int kMost = 6;
+  const int decimals =
+      error > 0.0 ? std::clamp(-static_cast<int>(std::floor(std::log10(0.5 * error))), 0, kMost)
+                  : kMost;
+  return decimal_text(value, decimals) + " ± " + decimal_text(error, decimals) + unit;
 }
 
 }  // namespace
@@ -155,6 +156,7 @@ bool is_name_of_check(const std::string& name) {
 
 CheckResult check_photograph(const Lens& lens, const CamOptions& options, const Photograph& photo,
                              const Executor& executor, const RunControl& control) {
+  require_light(photo);  // Before the rows are planned, which takes long.
   const WallModel model(lens, options, kFine, executor, control);
   const WallPicture forecast = wall_picture(model, Deviations::Zero());
   const Eigen::VectorXd found = find_picture(photo, forecast);
@@ -176,8 +178,8 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options, const 
     }
   }
   result.forecast = resample(inside, lens.target.columns(), lens.target.rows());
-  result.to_target = likeness(result.rectified, lens.target, executor);
-  result.to_forecast = likeness(result.rectified, result.forecast, executor);
+  result.to_target = likeness(result.rectified, lens.target);
+  result.to_forecast = likeness(result.rectified, result.forecast);
   return result;
 }
 
@@ -203,6 +205,22 @@ DeviationName name_of(Deviation deviation) {
       {"haze", "haze"},
   }};
   return kNames[static_cast<std::size_t>(deviation)];
+}
+
+/// Deviations of which a photograph tells how large they are. Lamps that are planned to be far away
+/// have a distance only where they are found to be near.
+std::vector<Deviation> told_of(const CheckResult& result, const Lens& lens) {
+  std::vector<Deviation> told;
+  for (std::size_t k = 0; k < kDeviations; ++k) {
+    const auto d = static_cast<Deviation>(k);
+    if (result.fit.errors[index_of(d)] == 0.0) continue;
+    if (d == Deviation::kLampDistance && !lamp_distance(lens.setup) &&
+        result.fit.deviations[index_of(d)] <= 0.0) {
+      continue;
+    }
+    told.push_back(d);
+  }
+  return told;
 }
 
 /// A deviation in the unit that people measure it in.
@@ -269,16 +287,17 @@ std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions
       return "the wall is " + off + (more ? " too far: move it nearer" : " too near: move it away");
     case Deviation::kTiltX:
       return "the wall is tilted by " + off + " about its horizontal axis: move its " +
-             (m.value > 0.0 ? "lower" : "upper") + " edge nearer";
+             (more ? "upper" : "lower") + " edge nearer";
     case Deviation::kTiltY:
-      return "the wall is tilted by " + off +
-             " about its vertical axis: turn it parallel to the "
-             "lens";
+      // The screen's x axis points to the picture's left in the view of lenses from their front.
+      return "the wall is tilted by " + off + " about its vertical axis: move its " +
+             (more == (lens.setup.view == ViewSide::kFront) ? "right" : "left") + " edge nearer";
     case Deviation::kLampSize:
       return "the lamp is " + now + " wide" + planned + ": use a " +
              (more ? "smaller or farther" : "larger or nearer") + " one, or design for it";
     case Deviation::kLampDistance:
-      return "the lamp is " + now + " from the lens: move it " +
+      return "the lamp is " + now + " from the lens" +
+             (std::isfinite(m.nominal) ? planned : " instead of far away") + ": move it " +
              (more ? "nearer" : "away, or design for its distance");
     case Deviation::kIndex:
       return "the refractive index is " + now + planned + ": design for it";
@@ -334,29 +353,48 @@ nlohmann::json likeness_json(const Likeness& likeness) {
           {"ssim_blurred", likeness.blurred.ssim}};
 }
 
-nlohmann::json cause_json(const FoundCause& cause, const Lens& lens, const CamOptions& options) {
-  const Measured m = measured(cause.deviation, cause.value, cause.error, lens, options);
-  nlohmann::json alternatives = nlohmann::json::array();
-  for (const Deviation d : cause.alternatives) alternatives.push_back(name_of(d).key);
-  return {{"cause", name_of(cause.deviation).key},
-          {"value", m.value},
+nlohmann::json measured_json(const Measured& m) {
+  return {{"value", m.value},
           {"uncertainty", m.error},
           {"planned", std::isfinite(m.nominal) ? nlohmann::json(m.nominal) : nlohmann::json()},
-          {"unit", std::string(m.unit.substr(m.unit.starts_with(' ') ? 1 : 0))},
-          {"evidence", cause.evidence},
-          {"words", words_of(cause, lens, options)},
-          {"cannot_be_told_from", alternatives}};
+          {"unit", m.unit.substr(m.unit.starts_with(' ') ? 1 : 0)}};
+}
+
+nlohmann::json cause_json(const FoundCause& cause, const Lens& lens, const CamOptions& options) {
+  nlohmann::json json =
+      measured_json(measured(cause.deviation, cause.value, cause.error, lens, options));
+  json["cause"] = name_of(cause.deviation).key;
+  json["evidence"] = cause.evidence;
+  json["words"] = words_of(cause, lens, options);
+  json["cannot_be_told_from"] = nlohmann::json::array();
+  for (const Deviation d : cause.alternatives) {
+    json["cannot_be_told_from"].push_back(name_of(d).key);
+  }
+  return json;
+}
+
+/// Every deviation if it were added to the causes.
+nlohmann::json all_json(const CheckResult& result, const Lens& lens, const CamOptions& options) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const Deviation d : told_of(result, lens)) {
+    const Eigen::Index i = index_of(d);
+    json[name_of(d).key] =
+        measured_json(measured(d, result.fit.alone[i], result.fit.errors[i], lens, options));
+  }
+  return json;
 }
 
 }  // namespace
 
 nlohmann::json check_json(const CheckResult& result, const Lens& lens, const CamOptions& options) {
   nlohmann::json causes = nlohmann::json::array();
-  for (const FoundCause& cause : result.fit.found)
+  for (const FoundCause& cause : result.fit.found) {
     causes.push_back(cause_json(cause, lens, options));
+  }
   return {{"program", program_mark()},
           {"verdict", verdict_of(result, lens, options)},
           {"causes", causes},
+          {"measured", all_json(result, lens, options)},
           {"forecast_of", result.part ? "part" : "design"},
           {"residual", result.fit.residual},
           {"residual_without_causes", result.fit.unexplained},
@@ -394,22 +432,21 @@ std::string likeness_row(const Likeness& l) {
          ", SSIM " + decimal_text(l.blurred.ssim, 3);
 }
 
-std::string causes_table(const CheckResult& result, const Lens& lens, const CamOptions& options) {
-  if (result.fit.found.empty()) return "";
-  const std::array<TableColumn, 4> columns{
-      {{"cause"}, {"value", true}, {"planned", true}, {"cannot be told from"}}};
+std::string measured_table(const CheckResult& result, const Lens& lens, const CamOptions& options) {
+  const std::array<TableColumn, 3> columns{{{""}, {"measured", true}, {"planned", true}}};
   std::vector<std::vector<std::string>> rows;
-  for (const FoundCause& cause : result.fit.found) {
-    const Measured m = measured(cause.deviation, cause.value, cause.error, lens, options);
-    std::string others;
-    for (const Deviation d : cause.alternatives) {
-      others += (others.empty() ? "" : ", ") + std::string(name_of(d).words);
-    }
-    rows.push_back({escape_html(name_of(cause.deviation).words),
-                    escape_html(plus_minus(m.value, m.error, m.unit)),
-                    escape_html(number_text(m.nominal, 3) + m.unit), escape_html(others)});
+  for (const Deviation d : told_of(result, lens)) {
+    const Eigen::Index i = index_of(d);
+    const Measured m = measured(d, result.fit.alone[i], result.fit.errors[i], lens, options);
+    const std::string planned =
+        std::isfinite(m.nominal) ? number_text(m.nominal, 3) + m.unit : "far away";
+    rows.push_back({escape_html(capital(name_of(d).words)),
+                    escape_html(plus_minus(m.value, m.error, m.unit)), escape_html(planned)});
   }
-  return html_table(columns, rows);
+  return html_table(columns, rows) +
+         element("p", "",
+                 "Each as if nothing but it and the causes above were other than planned. The "
+                 "wall's distance, the lamp's and the index change a picture alike.");
 }
 
 std::string report_page(const CheckResult& result, const Lens& lens, const CamOptions& options,
@@ -445,7 +482,8 @@ std::string report_page(const CheckResult& result, const Lens& lens, const CamOp
   PageContent page;
   page.title = "Check of a photograph";
   page.header = element("h1", "", "What the wall says");
-  page.body = html_section("Causes", causes + causes_table(result, lens, options)) +
+  page.body = html_section("Causes", causes) +
+              html_section("Measured", measured_table(result, lens, options)) +
               html_section("Pictures", pictures) + html_section("Figures", html_facts(facts));
   page.footer = escape_html(program_mark());
   return html_page(page);
@@ -473,6 +511,7 @@ Workshop fitted_workshop(const CheckResult& result, const Lens& lens, const CamO
   Workshop workshop = options.workshop;
   const int ball = finishing_ball(options).number;
   for (const FoundCause& cause : result.fit.found) {
+    if (!cause.alternatives.empty()) continue;
     switch (cause.deviation) {
       case Deviation::kPolish:
         workshop.polish.sigma *= std::exp(cause.value);

@@ -51,7 +51,6 @@ void move_lamp(OpticalSetup& setup, double vergence) {
     point->position = centre + away.normalized() / (1.0 / away.norm() + vergence);
     return;
   }
-  if (vergence <= 0.0) return;
   const Eigen::Vector3d direction = std::get<ParallelLight>(setup.lamp).direction;
   const double angle = setup.extent.width;
   setup.lamp = PointSource{centre - direction / vergence, Emission::kIsotropic};
@@ -83,6 +82,8 @@ DeviationLimits deviation_limits(const OpticalSetup& setup) {
       0.6;
   limits.least = -limits.most;
   limits.least[index_of(Deviation::kHaze)] = 0.0;
+  // No lamp is farther than that of parallel light.
+  if (!lamp_distance(setup)) limits.least[index_of(Deviation::kLampDistance)] = 0.0;
   return limits;
 }
 

@@ -224,15 +224,31 @@ SeenPixels::SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, dou
   seen_ = Eigen::Map<const Eigen::VectorXd>(seen.data(), std::ssize(seen));
 }
 
+/// The picture's own pixels are means already: the places add what a pixel's variance on the wall
+/// has beyond theirs, so that neither is blurred more than the other. A perspective changes pixels
+/// by tens of per cent, which would read as another lamp.
 WallPicture::Light SeenPixels::seen_light(const Eigen::VectorXd& view, const WallPicture& wall,
                                           const Eigen::Vector2d& place) const {
-  const double quarter = 0.25 * pixel_;
+  constexpr double kShare = 0.25;
   const Eigen::Vector2d at = wall_of(view, place);
-  const Eigen::Vector2d right = wall_of(view, place + Eigen::Vector2d(quarter, 0.0)) - at;
-  const Eigen::Vector2d below = wall_of(view, place + Eigen::Vector2d(0.0, quarter)) - at;
+  const Eigen::Vector2d side(0.5 * wall.inner_columns(), 0.5 * wall.inner_rows());
+  const auto edge = [&](const Eigen::Vector2d& way) {
+    const Eigen::Vector2d moved = wall_of(view, place + kShare * pixel_ * way) - at;
+    return Eigen::Vector2d(moved.cwiseProduct(side) / kShare);
+  };
+  const Eigen::Vector2d right = edge(Eigen::Vector2d::UnitX());
+  const Eigen::Vector2d below = edge(Eigen::Vector2d::UnitY());
+  // A parallelogram's covariance is that of its sides' ends / 12.
+  const Eigen::Matrix2d more =
+      (right * right.transpose() + below * below.transpose() - Eigen::Matrix2d::Identity()) / 12.0;
+  const double x = std::sqrt(std::max(more(0, 0), 0.0));
+  const double slant = x > 0.0 ? more(0, 1) / x : 0.0;
+  const double y = std::sqrt(std::max(more(1, 1) - slant * slant, 0.0));
+  const Eigen::Vector2d across = Eigen::Vector2d(x, slant).cwiseQuotient(side);
+  const Eigen::Vector2d down = Eigen::Vector2d(0.0, y).cwiseQuotient(side);
   WallPicture::Light mean;
   for (const auto& [a, b] : {std::pair(-1.0, -1.0), {1.0, -1.0}, {-1.0, 1.0}, {1.0, 1.0}}) {
-    const WallPicture::Light light = wall.at(at + a * right + b * below);
+    const WallPicture::Light light = wall.at(at + a * across + b * down);
     mean.value += 0.25 * light.value;
     mean.gradient += 0.25 * light.gradient;
   }
@@ -458,12 +474,14 @@ std::vector<int> with_light(std::vector<int> free) {
 /// Level of the wall without the picture.
 double ambient_of(const Image& light) { return quantile(light, 0.1); }
 
-/// Dimmest picture that 8 bits resolve, light above the wall's.
-constexpr double kTooDark = 0.01;
+/// Dimmest picture that 8 bits resolve.
+constexpr double kTooDark = 0.02;
 /// Least ratio of the brightest light to the wall's: a picture is brighter than its surroundings.
 constexpr double kShows = 1.3;
 /// Share of a picture's light beyond which clipping leaves too little to compare.
 constexpr double kMostClipped = 0.35;
+
+}  // namespace
 
 void require_light(const Photograph& photo) {
   const double ambient = ambient_of(photo.light);
@@ -483,16 +501,18 @@ void require_light(const Photograph& photo) {
         number_text(100.0 * static_cast<double>(clipped) / static_cast<double>(lit), 2) +
         " % of the lit wall is clipped, at most 35 %; expose a quarter as long");
   }
-  if (bright - ambient < kTooDark) {
+  if (bright < kTooDark) {
     throw InputError(photo.name + ": is too dark: the brightest wall has " +
                      number_text(100.0 * bright, 2) +
-                     " % of white, 1 % more than its surroundings is needed; expose longer");
+                     " % of white, must be 2 % or more; expose longer");
   }
   if (bright < kShows * ambient) {
     throw InputError(photo.name +
                      ": shows no picture of the lens: nothing is brighter than the wall around it");
   }
 }
+
+namespace {
 
 /// Least correlation of the right picture after the search.
 constexpr double kSame = 0.8;

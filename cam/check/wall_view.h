@@ -87,8 +87,8 @@ class SeenPixels {
   SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, double reach);
 
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(places_.size()); }
-  /// Display values that the view makes of a picture: the mean of 2 × 2 places in every pixel,
-  /// which is that over the pixel where it is twice as wide as the picture's.
+  /// Display values that the view makes of a picture: the mean of four places in every pixel, with
+  /// the variance of the pixel on the wall where it is wider than the picture's.
   [[nodiscard]] Eigen::VectorXd shown(const Eigen::VectorXd& view, const WallPicture& wall) const;
   /// Their derivatives by the view's values; those of light by its middle.
   [[nodiscard]] Eigen::MatrixXd derivatives(const Eigen::VectorXd& view,
@@ -116,6 +116,10 @@ Eigen::VectorXd fit_view(const SeenPixels& pixels, const WallPicture& wall, Eige
 
 /// Problem in a view's values, all free, without its residuals.
 LeastSquares view_problem();
+
+/// @throw InputError naming the photograph: too dark, clipped, or nothing is brighter than the
+/// wall.
+void require_light(const Photograph& photo);
 
 /// Finds a picture in a photograph.
 /// @throw InputError naming the photograph: no picture in it, too dark, clipped, mirrored, upside

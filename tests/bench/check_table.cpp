@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <numbers>
@@ -18,13 +19,16 @@
 #include "cam/check/virtual_wall.h"
 #include "cam/check/wall_model.h"
 #include "cam/check/wall_view.h"
+#include "core/image/image_io.h"
 #include "core/lens/lens.h"
 #include "core/text/number_text.h"
 
 /// Photographs of a virtual wall with known faults, and what `check` names: the tables of
 /// docs/check.md.
 ///
-///     check_table LENS [PHOTOGRAPHS-OF-EACH-CAUSE [WITH-TWO [WITHOUT-ANY]]]
+///     check_table LENS [PHOTOGRAPHS-OF-EACH-CAUSE [WITH-TWO [WITHOUT-ANY [FOLDER]]]]
+///
+/// A folder gets the photographs, for a look at them with `lensforge check`.
 namespace lensforge {
 namespace {
 
@@ -95,30 +99,44 @@ const std::vector<Cause>& causes() {
   return kCauses;
 }
 
-/// Names of the causes that a fit found.
-std::set<std::string> names_of(const CauseFit& fit) {
+std::string name_of(Deviation deviation) {
+  for (const Cause& cause : causes()) {
+    if (cause.deviations.contains(deviation)) return cause.name;
+  }
+  return "?";
+}
+
+/// Names of the causes that a fit found, and of those that it cannot tell from them.
+std::set<std::string> names_of(const CauseFit& fit, bool with_groups) {
   std::set<std::string> names;
   for (const FoundCause& found : fit.found) {
-    for (const Cause& cause : causes()) {
-      if (cause.deviations.contains(found.deviation)) names.insert(cause.name);
-    }
+    names.insert(name_of(found.deviation));
+    if (!with_groups) continue;
+    for (const Deviation d : found.alternatives) names.insert(name_of(d));
   }
   return names;
 }
 
 class Bench {
  public:
-  explicit Bench(const Lens& lens)
+  Bench(const Lens& lens, std::string folder)
       : lens_(lens),
+        folder_(std::move(folder)),
         workshop_(lens, options_, executor_),
         model_(lens, options_, 3, executor_, {}) {}
 
-  /// What a photograph of a fault says; prints a line.
-  CauseFit run(const Fault& fault, std::uint64_t seed, const std::string& name) const {
+  [[nodiscard]] virtual_wall::WallLight light(const Fault& fault) const {
+    return workshop_.light(fault);
+  }
+  /// What a photograph of the wall says; prints a line.
+  CauseFit run(const virtual_wall::WallLight& light, std::uint64_t seed,
+               const std::string& name) const {
     const virtual_wall::Camera camera = virtual_wall::any_camera(seed);
-    const virtual_wall::WallLight light = workshop_.light(fault);
-    const Photograph photo =
-        photograph(virtual_wall::photograph(light, lens_.setup.image_size, camera), {}, name);
+    const Image seen = virtual_wall::photograph(light, lens_.setup.image_size, camera);
+    if (!folder_.empty()) {
+      write_image(seen, std::filesystem::path(folder_) / (std::to_string(seed) + ".png"));
+    }
+    const Photograph photo = photograph(seen, {}, name);
     const auto start = std::chrono::steady_clock::now();
     const Eigen::VectorXd view = find_picture(photo, wall_picture(model_, Deviations::Zero()));
     const Photograph less =
@@ -126,12 +144,22 @@ class Bench {
     const CauseFit fit = find_causes(model_, SeenPixels(less, view, 1.2), view, {});
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    std::cerr << name << " " << seed << ": rms " << fit.unexplained << " to " << fit.residual;
+    std::cerr << name << ", camera " << seed << " (yaw " << number_text(camera.yaw, 2) << ", pitch "
+              << number_text(camera.pitch, 2) << ", ambient " << number_text(camera.ambient, 2)
+              << ", white " << number_text(camera.white, 3) << "), "
+              << number_text(pixels_across(photo, view), 3) << " pixels, rms " << fit.unexplained
+              << " to " << fit.residual << ", " << number_text(seconds, 2) << " s\n";
     for (const FoundCause& f : fit.found) {
-      std::cerr << ", " << index_of(f.deviation) << " = " << f.value << " ± " << f.error << " ("
-                << f.evidence << ")";
+      std::cerr << "  found " << name_of(f.deviation) << " (" << index_of(f.deviation) << ") "
+                << f.value << " ± " << f.error << ", evidence " << number_text(f.evidence, 3);
+      for (const Deviation d : f.alternatives) std::cerr << ", or " << index_of(d);
+      std::cerr << "\n";
     }
-    std::cerr << ", " << seconds << " s\n";
+    std::cerr << "  alone";
+    for (Eigen::Index k = 0; k < fit.alone.size(); ++k) {
+      std::cerr << " " << number_text(fit.alone[k], 3);
+    }
+    std::cerr << "\n";
     return fit;
   }
 
@@ -139,6 +167,7 @@ class Bench {
 
  private:
   const Lens& lens_;
+  std::string folder_;
   CamOptions options_;
   Executor executor_ = Executor::cpu(1);
   virtual_wall::Workshop workshop_;
@@ -149,12 +178,7 @@ class Bench {
 using Confusion = std::map<std::string, std::map<std::string, int>>;
 
 std::string first_of(const CauseFit& fit) {
-  for (const Cause& cause : causes()) {
-    if (!fit.found.empty() && cause.deviations.contains(fit.found.front().deviation)) {
-      return cause.name;
-    }
-  }
-  return "nothing";
+  return fit.found.empty() ? "nothing" : name_of(fit.found.front().deviation);
 }
 
 void print(const Confusion& confusion) {
@@ -191,7 +215,8 @@ struct Draw {
 };
 
 void run_single(const Bench& bench, int each, Draw& draw, Confusion& confusion) {
-  int exact = 0;
+  int alone = 0;
+  int in_groups = 0;
   std::vector<std::pair<std::string, std::vector<double>>> errors;
   std::uint64_t seed = 100;
   for (const Cause& cause : causes()) {
@@ -200,15 +225,19 @@ void run_single(const Bench& bench, int each, Draw& draw, Confusion& confusion) 
       Fault fault;
       const double size = draw();
       cause.put(fault, size, draw());
-      const CauseFit fit = bench.run(fault, ++seed, cause.name);
+      const double truth = cause.truth(fault);
+      const CauseFit fit =
+          bench.run(bench.light(fault), ++seed, cause.name + " " + number_text(truth, 3));
       ++confusion[cause.name][first_of(fit)];
-      exact += names_of(fit) == std::set<std::string>{cause.name} ? 1 : 0;
-      off.push_back(std::abs(cause.found(fit.deviations, bench.lamp()) - cause.truth(fault)));
+      alone += names_of(fit, false) == std::set<std::string>{cause.name} ? 1 : 0;
+      in_groups += names_of(fit, true).contains(cause.name) ? 1 : 0;
+      off.push_back(std::abs(cause.found(fit.deviations, bench.lamp()) - truth));
     }
     errors.emplace_back(cause.name, off);
   }
-  std::cout << "one cause: " << exact << " of " << each * std::ssize(causes())
-            << " named alone\n\n| cause | median error | 9 of 10 |\n|---|---|---|\n";
+  std::cout << "one cause: of " << each * std::ssize(causes()) << " named alone " << alone
+            << ", among those that are named or cannot be told from them " << in_groups
+            << "\n\n| cause | median error | 9 of 10 |\n|---|---|---|\n";
   for (const auto& [name, off] : errors) print_errors(name, off);
 }
 
@@ -224,22 +253,39 @@ void run_pairs(const Bench& bench, int pairs, Draw& draw) {
       causes()[i].put(fault, size, draw());
     }
     const std::string name = causes()[one].name + "+" + causes()[other].name;
-    const std::set<std::string> names =
-        names_of(bench.run(fault, 1000 + static_cast<std::uint64_t>(k), name));
+    const CauseFit fit = bench.run(bench.light(fault), 1000 + static_cast<std::uint64_t>(k), name);
+    const std::set<std::string> names = names_of(fit, true);
     both += names.contains(causes()[one].name) && names.contains(causes()[other].name) ? 1 : 0;
   }
-  std::cout << "\ntwo causes: both named in " << both << " of " << pairs << "\n\n";
+  if (pairs > 0) std::cout << "\ntwo causes: both in groups in " << both << " of " << pairs << "\n";
 }
 
-void run(const Lens& lens, int each, int pairs, int without) {
-  const Bench bench(lens);
+/// What is found of each deviation where nothing is wrong, rms: model_error() of the fit.
+void print_alone(const std::vector<CauseFit>& fits) {
+  if (fits.empty()) return;
+  Deviations squares = Deviations::Zero();
+  for (const CauseFit& fit : fits) squares += fit.alone.cwiseAbs2();
+  std::cout << "nothing wrong, rms of each deviation alone:";
+  for (const double square : squares) {
+    std::cout << " " << number_text(std::sqrt(square / static_cast<double>(fits.size())), 2);
+  }
+  std::cout << "\n";
+}
+
+void run(const Lens& lens, int each, int pairs, int without, const std::string& folder) {
+  const Bench bench(lens, folder);
   Draw draw;
   Confusion confusion;
+  std::vector<CauseFit> nothing;
+  const virtual_wall::WallLight light = bench.light({});
   for (int k = 0; k < without; ++k) {
-    ++confusion["nothing"][first_of(bench.run({}, static_cast<std::uint64_t>(k + 1), "nothing"))];
+    nothing.push_back(bench.run(light, static_cast<std::uint64_t>(k + 1), "nothing"));
+    ++confusion["nothing"][first_of(nothing.back())];
   }
+  print_alone(nothing);
   run_single(bench, each, draw, confusion);
   run_pairs(bench, pairs, draw);
+  std::cout << "\n";
   print(confusion);
 }
 
@@ -248,11 +294,12 @@ void run(const Lens& lens, int each, int pairs, int without) {
 
 int main(int argc, char** argv) {
   try {
-    if (argc < 2) throw std::runtime_error("check_table LENS [EACH [PAIRS [WITHOUT]]]");
+    if (argc < 2) throw std::runtime_error("check_table LENS [EACH [PAIRS [WITHOUT [FOLDER]]]]");
     const auto count = [&](int k, int otherwise) {
       return argc > k ? std::atoi(argv[k]) : otherwise;
     };
-    lensforge::run(lensforge::read_lens(argv[1]), count(2, 29), count(3, 50), count(4, 50));
+    lensforge::run(lensforge::read_lens(argv[1]), count(2, 29), count(3, 50), count(4, 50),
+                   argc > 5 ? argv[5] : "");
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cam/check/check_job.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+
+#include "cam/cam_meshes.h"
+#include "cam/check/virtual_wall.h"
+#include "core/temp_folder.h"
+
+namespace lensforge::check_job_test {
+namespace {
+
+using lensforge::testing::read_bytes;
+using lensforge::testing::TempFolder;
+using ::testing::HasSubstr;
+using virtual_wall::Fault;
+
+/// A lens of 4 mm whose picture has no symmetry: waves that gather light up to about twice.
+Lens wavy_lens() {
+  constexpr double kTwoPi = 2.0 * std::numbers::pi;
+  Lens lens;
+  lens.model = SurfaceModel::kSmooth;
+  lens.setup.lens_size = {4.0, 4.0};
+  lens.setup.image_size = {4.0, 4.0};
+  lens.setup.pixels = {32, 32};
+  lens.setup.focal_length = 16.0;
+  lens.setup.extent.width = 5e-3;
+  lens.surface = testing::grid_mesh(81, 81, 4.0, 4.0, [](double x, double y) {
+    return 2.0 + 0.0035 * std::sin(kTwoPi * x / 1.7 + 0.3) * std::cos(kTwoPi * y / 2.3) +
+           0.0025 * std::sin(kTwoPi * (x + 0.7 * y) / 1.5) +
+           0.0015 * std::cos(kTwoPi * (0.4 * x - y) / 1.1 + 1.0);
+  });
+  lens.target = Image(32, 32, 1.0F);
+  return lens;
+}
+
+/// What `check` says of a virtual photograph.
+class CheckJob : public ::testing::Test {
+ protected:
+  [[nodiscard]] CheckResult check(const Fault& fault, std::uint64_t seed) const {
+    virtual_wall::Camera camera = virtual_wall::any_camera(seed);
+    camera.yaw *= 0.5;
+    const Image seen =
+        virtual_wall::photograph(workshop_.light(fault), lens_.setup.image_size, camera);
+    return check_photograph(lens_, options_, photograph(seen, {}, "wall.jpg"), executor_, {});
+  }
+
+  Lens lens_ = wavy_lens();
+  CamOptions options_;
+  Executor executor_ = Executor::cpu(2);
+  virtual_wall::Workshop workshop_{lens_, options_, executor_};
+};
+
+TEST_F(CheckJob, NamesNothingWhereNothingIsWrong) {
+  const CheckResult result = check({}, 3);
+  EXPECT_TRUE(result.part) << result.fault;
+  EXPECT_TRUE(result.fit.found.empty()) << verdict_of(result, lens_, options_);
+  // The photograph is that of the forecast, not of the even target.
+  EXPECT_LT(result.to_forecast.metrics.mae, 0.02);
+  EXPECT_GT(result.to_target.metrics.mae, 2.0 * result.to_forecast.metrics.mae);
+  // It would have shown a lamp of twice the width.
+  const double angle = lamp_angle(lens_.setup);
+  EXPECT_LT(result.fit.errors[index_of(Deviation::kLampSize)], angle * angle);
+}
+
+TEST_F(CheckJob, NamesTheLampAndWritesIt) {
+  Fault fault;
+  fault.lamp = 1.0;
+  const CheckResult result = check(fault, 4);
+  ASSERT_FALSE(result.fit.found.empty());
+  const FoundCause& lamp = result.fit.found.front();
+  ASSERT_EQ(lamp.deviation, Deviation::kLampSize) << verdict_of(result, lens_, options_);
+  const double angle = lamp_angle(lens_.setup);
+  EXPECT_NEAR(std::sqrt(angle * angle + lamp.value), 2.0 * angle, 0.15 * 2.0 * angle);
+  EXPECT_LT(result.fit.residual, 0.7 * result.fit.unexplained);
+  const TempFolder folder;
+  EXPECT_EQ(write_check(result, lens_, options_, folder.path()).size(), kCheckFiles.size());
+  const auto json = nlohmann::json::parse(read_bytes(folder / check_file::kJson));
+  EXPECT_EQ(json["causes"][0]["cause"], "lamp_size");
+  EXPECT_NEAR(json["causes"][0]["planned"], 5.0, 1e-9);
+  EXPECT_EQ(json["measured"]["lamp_size"]["unit"], "mrad");
+  EXPECT_THAT(read_bytes(folder / check_file::kReport), HasSubstr("The lamp is"));
+  // Nothing of it is the workshop's.
+  const Workshop fitted = fitted_workshop(result, lens_, options_);
+  EXPECT_EQ(fitted.polish.sigma, options_.workshop.polish.sigma);
+}
+
+TEST_F(CheckJob, FittedWorkshopHasWhatIsCertain) {
+  CheckResult result;
+  FoundCause polish;
+  polish.deviation = Deviation::kPolish;
+  polish.value = std::log(1.3);
+  result.fit.found = {polish};
+  const double sigma = options_.workshop.polish.sigma;
+  EXPECT_NEAR(fitted_workshop(result, lens_, options_).polish.sigma, 1.3 * sigma, 1e-9);
+  result.fit.found.front().alternatives = {Deviation::kLampSize};
+  EXPECT_EQ(fitted_workshop(result, lens_, options_).polish.sigma, sigma);
+}
+
+/// Each in the words of the one who has to mend it.
+TEST_F(CheckJob, WordsSayWhatToDo) {
+  const auto words = [&](Deviation deviation, double value) {
+    FoundCause cause;
+    cause.deviation = deviation;
+    cause.value = value;
+    cause.error = 0.1 * std::abs(value);
+    return words_of(cause, lens_, options_);
+  };
+  EXPECT_EQ(words(Deviation::kDistance, 0.05),
+            "the wall is 0.80 ± 0.08 mm too far: move it nearer");
+  EXPECT_THAT(words(Deviation::kTiltX, 0.1), HasSubstr("move its upper edge nearer"));
+  EXPECT_THAT(words(Deviation::kLampDistance, 0.1), HasSubstr("instead of far away"));
+  EXPECT_THAT(words(Deviation::kPolish, 0.3), HasSubstr("polish less"));
+  EXPECT_THAT(words(Deviation::kHaze, 0.1), HasSubstr("10.0 ± 1.0 % of the light"));
+}
+
+}  // namespace
+}  // namespace lensforge::check_job_test
