@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -15,11 +16,15 @@
 namespace lensforge {
 namespace {
 
-/// Evidence that every cause must add: a deviation of some 3.5 standard errors.
-constexpr double kCost = 12.0;
+/// Evidence that every cause must add: a deviation of some 5.5 standard errors, since a model that
+/// follows one cause imperfectly explains the rest by others.
+constexpr double kCost = 30.0;
 /// Evidence that an alternative may lack.
 constexpr double kAlike = 12.0;
 constexpr int kMostCauses = 4;
+/// Causes that are fitted one by one in the first search: evidence is to first order only, and far
+/// from the photograph that misleads.
+constexpr std::ptrdiff_t kTried = 3;
 constexpr int kMostSearches = 6;
 constexpr int kMostRounds = 4;
 /// Steps shorter than this share of deviation_steps() end a fit.
@@ -249,6 +254,7 @@ class JointTest {
         tangents.residuals + columns * fit.deviations().cwiseQuotient(steps_);
     products_ = columns.transpose() * columns;
     along_ = columns.transpose() * rest;
+    square_ = rest.squaredNorm();
     for (std::size_t k = 0; k < kDeviations; ++k) {
       const auto d = static_cast<Deviation>(k);
       if (products_(index_of(d), index_of(d)) > kFaintest * kFaintest * fit.samples()) {
@@ -256,7 +262,7 @@ class JointTest {
       }
     }
     variance_ = tangents.residuals.squaredNorm() / fit.samples();
-    const Eigen::VectorXd least = rest - columns * estimate(showing_).steps;
+    const Eigen::VectorXd least = rest - columns * estimate(showing_, variance_).steps;
     variance_ = least.squaredNorm() / fit.samples() * fit.pixels().values_alike(least);
   }
 
@@ -265,15 +271,23 @@ class JointTest {
   /// By how much a photograph is likelier, in ln likelihood times 2, with a set of causes than with
   /// none, less their cost; infinitely less for sets that are not named.
   [[nodiscard]] double evidence(const std::vector<Deviation>& causes) const {
-    const Estimate with = estimate(causes);
+    const Estimate with = estimate(causes, variance_);
     if (!named(causes, with.steps)) return -std::numeric_limits<double>::infinity();
-    return with.gain - estimate({}).gain - kCost * static_cast<double>(causes.size());
+    return with.gain - estimate({}, variance_).gain - kCost * static_cast<double>(causes.size());
   }
 
-  /// The set of at most `most` causes with the most evidence; empty if none has any.
-  [[nodiscard]] std::vector<Deviation> best(int most) const {
-    std::vector<Deviation> best;
-    double highest = 0.0;
+  /// What speaks against a set of causes, in the same unit: comparable between fits.
+  /// @param variance  s²
+  [[nodiscard]] double misfit(const std::vector<Deviation>& causes, double variance) const {
+    return square_ / variance - estimate(causes, variance).gain +
+           kCost * static_cast<double>(causes.size());
+  }
+  [[nodiscard]] double variance() const { return variance_; }
+
+  /// Sets of at most `most` causes with evidence, the most of it first; of those that differ only
+  /// in what scales the throw, one. @param tried  that many at most.
+  [[nodiscard]] std::vector<std::vector<Deviation>> best(int most, std::ptrdiff_t tried) const {
+    std::vector<std::pair<double, std::vector<Deviation>>> sets;
     for (unsigned mask = 1; mask < 1U << showing_.size(); ++mask) {
       if (std::popcount(mask) > most) continue;
       std::vector<Deviation> causes;
@@ -281,9 +295,18 @@ class JointTest {
         if (((mask >> k) & 1U) != 0) causes.push_back(showing_[k]);
       }
       const double now = evidence(causes);
-      if (now <= highest) continue;
-      highest = now;
-      best = causes;
+      if (now > 0.0) sets.emplace_back(now, causes);
+    }
+    std::stable_sort(sets.begin(), sets.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<std::vector<Deviation>> best;
+    std::set<std::vector<Deviation>> kinds;
+    for (const auto& [with, causes] : sets) {
+      if (std::ssize(best) == tried) break;
+      std::vector<Deviation> kind = causes;
+      std::replace_if(kind.begin(), kind.end(), scales_throw, Deviation::kDistance);
+      std::sort(kind.begin(), kind.end());
+      if (kinds.insert(kind).second) best.push_back(causes);
     }
     return best;
   }
@@ -296,7 +319,7 @@ class JointTest {
   /// Of one of these causes.
   [[nodiscard]] Value value(const std::vector<Deviation>& causes, Deviation deviation) const {
     const Eigen::Index i = index_of(deviation);
-    const Estimate with = estimate(causes);
+    const Estimate with = estimate(causes, variance_);
     return {steps_[i] * with.steps[i], steps_[i] * std::sqrt(with.variances[i] + own_[i])};
   }
 
@@ -306,16 +329,16 @@ class JointTest {
     Deviations variances;
     double gain = 0.0;  ///< |r|² / s² less the least sum.
   };
-  [[nodiscard]] Estimate estimate(const std::vector<Deviation>& causes) const {
+  [[nodiscard]] Estimate estimate(const std::vector<Deviation>& causes, double variance) const {
     Deviations weights = own_;
     for (const Deviation d : causes) weights[index_of(d)] += prior_[index_of(d)];
-    Eigen::MatrixXd matrix = products_ / variance_;
+    Eigen::MatrixXd matrix = products_ / variance;
     matrix.diagonal() += weights.cwiseInverse();
     const Eigen::MatrixXd inverse = matrix.inverse();
     Estimate result;
-    result.steps = inverse * along_ / variance_;
+    result.steps = inverse * along_ / variance;
     result.variances = inverse.diagonal();
-    result.gain = result.steps.dot(along_) / variance_;
+    result.gain = result.steps.dot(along_) / variance;
     return result;
   }
 
@@ -333,6 +356,7 @@ class JointTest {
   DeviationLimits limits_;
   Eigen::MatrixXd products_;
   Deviations along_;
+  double square_ = 0.0;    ///< |r|²
   double variance_ = 0.0;  ///< s²
   std::vector<Deviation> showing_;
 };
@@ -385,15 +409,21 @@ CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eig
   CauseFit result;
   result.unexplained = std::sqrt(fit.square() / fit.samples());
   for (int search = 0; search < kMostSearches; ++search) {
-    const std::vector<Deviation> causes = test.best(std::min(search + 1, kMostCauses));
-    if (causes == fit.active()) break;
-    DeviationFit next = fit;
-    next.activate(causes);
-    next.run();
-    const JointTest there(next);
-    if (!(there.evidence(causes) > std::max(there.evidence(fit.active()), 0.0))) break;
-    fit = next;
-    test = there;
+    const DeviationFit from = fit;
+    const std::ptrdiff_t tried = search == 0 ? kTried : 1;
+    for (const std::vector<Deviation>& causes :
+         test.best(std::min(search + 1, kMostCauses), tried)) {
+      if (causes == from.active()) continue;
+      DeviationFit next = from;
+      next.activate(causes);
+      next.run();
+      const JointTest there(next);
+      const double variance = std::min(test.variance(), there.variance());
+      if (there.misfit(causes, variance) >= test.misfit(fit.active(), variance)) continue;
+      fit = next;
+      test = there;
+    }
+    if (fit.active() == from.active()) break;
   }
   describe_all(fit, test, result);
   for (const Deviation d : fit.active()) result.found.push_back(described(fit, test, d));
