@@ -9,12 +9,9 @@
 #include "app/frame/option_set.h"
 #include "cam/check/check_job.h"
 #include "cam/check/wall_view.h"
-#include "cam/coupon/coupon_fit.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/io/files.h"
 #include "core/lens/lens.h"
-#include "core/schema/toml.h"
 #include "core/text/words.h"
 
 namespace lensforge::app {
@@ -29,7 +26,6 @@ struct CheckSettings {
   std::string out;
   std::string dark;
   std::string workshop;
-  std::string fit;
   bool force = false;
   CamOptions cam;
 };
@@ -44,9 +40,6 @@ void describe(Description& d, CheckSettings& settings) {
          "the same view and exposure with the lamp off: the room's light, which is subtracted");
   d.text("--workshop", settings.workshop, "FILE.toml",
          "the workshop that made the part; without it the default one");
-  d.text("--fit", settings.fit, "FILE.toml",
-         "write the workshop with what the photograph tells of polish, finishing ball, pitch error "
-         "and haze, where it can tell them from other causes");
   d.flag("--force", settings.force, "replace files that lensforge did not write");
 }
 
@@ -70,17 +63,7 @@ Photograph read_photos(const CheckSettings& settings, CommandFrame& frame) {
   return bracketed(exposures);
 }
 
-std::string workshop_text(const CheckSettings& settings, const Workshop& fitted) {
-  const std::string text =
-      settings.workshop.empty() ? "" : read_toml_file(settings.workshop, "a workshop");
-  if (!text.empty()) {
-    if (const auto edited = edited_workshop(text, fitted)) return *edited;
-  }
-  return workshop_toml(fitted);
-}
-
-std::vector<std::string> warnings_of(const CheckSettings& settings, const Lens& lens,
-                                     const CheckResult& result) {
+std::vector<std::string> warnings_of(const Lens& lens, const CheckResult& result) {
   constexpr double kFewest = 1.5;
   std::vector<std::string> warnings;
   if (!result.part) {
@@ -92,12 +75,6 @@ std::vector<std::string> warnings_of(const CheckSettings& settings, const Lens& 
                        " pixels per pixel of the picture, 1.5 or more tell causes better; go "
                        "nearer");
   }
-  if (settings.fit.empty()) return warnings;
-  for (const FoundCause& cause : result.fit.found) {
-    if (cause.alternatives.empty()) continue;
-    warnings.push_back("--fit leaves out what a photograph cannot tell from other causes: " +
-                       words_of(cause, lens, settings.cam));
-  }
   return warnings;
 }
 
@@ -105,7 +82,6 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   if (!settings.workshop.empty()) settings.cam.workshop = read_workshop(settings.workshop);
   const Lens lens = read_lens(settings.source);
   validate(settings.cam, lens.setup);
-  if (!settings.fit.empty()) require_replaceable("--fit", settings.fit, settings.force);
   frame.begin_folder(settings.out).remove_partial_files(is_name_of_check);
   for (const char* name : kCheckFiles) {
     require_replaceable("--out", fs::path(settings.out) / name, settings.force);
@@ -113,26 +89,21 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   const Photograph photo = read_photos(settings, frame);
   const CheckResult result =
       check_photograph(lens, settings.cam, photo, frame.executor(), frame.control());
-  std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
-  if (!settings.fit.empty()) {
-    write_whole_file(settings.fit,
-                     workshop_text(settings, fitted_workshop(result, lens, settings.cam)));
-    files.emplace_back(settings.fit);
-  }
+  const std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
   nlohmann::json json = check_json(result, lens, settings.cam);
   json["status"] = "done";
   json["options"] = frame.options().used();
   json["files"] = files_json(files);
   std::string text = verdict_of(result, lens, settings.cam) + "\n";
   for (std::size_t k = 1; k < result.fit.found.size(); ++k) {
-    text += "also: " + words_of(result.fit.found[k], lens, settings.cam) + "\n";
+    text += "perhaps also: " + words_of(result.fit.found[k], lens, settings.cam) + "\n";
   }
   text += "  MAE against the target " + fixed(result.to_target.metrics.mae, 4) +
           ", against the forecast " + fixed(result.to_forecast.metrics.mae, 4) + "\n";
   return {json,
           text,
           kDone,
-          warnings_of(settings, lens, result),
+          warnings_of(lens, result),
           {"look at " + (fs::path(settings.out) / check_file::kReport).string()}};
 }
 

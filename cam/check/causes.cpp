@@ -22,8 +22,8 @@ constexpr double kCost = 30.0;
 /// Evidence that an alternative may lack.
 constexpr double kAlike = 12.0;
 constexpr int kMostCauses = 4;
-/// Causes that are fitted one by one in the first search: evidence is to first order only, and far
-/// from the photograph that misleads.
+/// Sets of causes that are fitted in every search: evidence is to first order only, and far from
+/// the photograph that misleads.
 constexpr std::ptrdiff_t kTried = 3;
 constexpr int kMostSearches = 6;
 constexpr int kMostRounds = 4;
@@ -219,7 +219,7 @@ Deviations prior_of(const Deviations& steps) {
 }
 
 /// Standard deviation of what is found of a deviation where nothing is wrong: cameras and
-/// predictions are no better. docs/check.md says how it was measured.
+/// predictions are no better. As three photographs of one lens on a virtual wall had it, or more.
 Deviations model_error(const Deviations& steps) {
   Deviations error;
   error << 0.0013, 0.003, 0.003, 0.13 * steps[index_of(Deviation::kLampSize)], 0.0013, 0.0014, 0.01,
@@ -284,9 +284,9 @@ class JointTest {
   }
   [[nodiscard]] double variance() const { return variance_; }
 
-  /// Sets of at most `most` causes with evidence, the most of it first; of those that differ only
-  /// in what scales the throw, one. @param tried  that many at most.
-  [[nodiscard]] std::vector<std::vector<Deviation>> best(int most, std::ptrdiff_t tried) const {
+  /// Sets of at most `most` causes with evidence, the most of it first, kTried of them; of those
+  /// that differ only in what scales the throw, one.
+  [[nodiscard]] std::vector<std::vector<Deviation>> best(int most) const {
     std::vector<std::pair<double, std::vector<Deviation>>> sets;
     for (unsigned mask = 1; mask < 1U << showing_.size(); ++mask) {
       if (std::popcount(mask) > most) continue;
@@ -302,7 +302,7 @@ class JointTest {
     std::vector<std::vector<Deviation>> best;
     std::set<std::vector<Deviation>> kinds;
     for (const auto& [with, causes] : sets) {
-      if (std::ssize(best) == tried) break;
+      if (std::ssize(best) == kTried) break;
       std::vector<Deviation> kind = causes;
       std::replace_if(kind.begin(), kind.end(), scales_throw, Deviation::kDistance);
       std::sort(kind.begin(), kind.end());
@@ -410,9 +410,7 @@ CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eig
   result.unexplained = std::sqrt(fit.square() / fit.samples());
   for (int search = 0; search < kMostSearches; ++search) {
     const DeviationFit from = fit;
-    const std::ptrdiff_t tried = search == 0 ? kTried : 1;
-    for (const std::vector<Deviation>& causes :
-         test.best(std::min(search + 1, kMostCauses), tried)) {
+    for (const std::vector<Deviation>& causes : test.best(std::min(search + 1, kMostCauses))) {
       if (causes == from.active()) continue;
       DeviationFit next = from;
       next.activate(causes);

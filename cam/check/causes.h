@@ -36,9 +36,9 @@ struct CauseFit {
 };
 
 /// Finds the set of causes with the most evidence, less what speaks against so many and so large
-/// ones beforehand: all sets are compared to first order, the best is fitted together with the view
-/// by Gauss-Newton steps over pictures that are predicted anew, and all are compared again around
-/// it, with one more cause allowed each time, until none is better.
+/// ones beforehand: all sets are compared to first order, the best few are fitted together with the
+/// view by Gauss-Newton steps over pictures that are predicted anew, and all are compared again
+/// around it, with one more cause allowed each time, until none is better.
 /// @param view  find_picture()'s. @throw Interrupted
 CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
                      const RunControl& control);

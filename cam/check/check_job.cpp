@@ -15,7 +15,6 @@
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/optics/picture_blur.h"
-#include "core/optics/polish_transfer.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
@@ -340,7 +339,7 @@ std::string verdict_of(const CheckResult& result, const Lens& lens, const CamOpt
     return "Nothing is wrong that shows in this photograph";
   }
   const FoundCause& first = result.fit.found.front();
-  return capital(words_of(first, lens, options)) + alternatives_words(first);
+  return "Likeliest: " + words_of(first, lens, options) + alternatives_words(first);
 }
 
 namespace {
@@ -454,9 +453,9 @@ std::string report_page(const CheckResult& result, const Lens& lens, const CamOp
   std::string causes = element("p", "", escape_html(verdict_of(result, lens, options) + "."));
   for (std::size_t k = 1; k < result.fit.found.size(); ++k) {
     const FoundCause& cause = result.fit.found[k];
-    causes += element(
-        "p", "",
-        escape_html("Also: " + words_of(cause, lens, options) + alternatives_words(cause) + "."));
+    causes += element("p", "",
+                      escape_html("Perhaps also: " + words_of(cause, lens, options) +
+                                  alternatives_words(cause) + "."));
   }
   const std::array<NamedText, 4> facts{{
       {"MAE against the target", likeness_row(result.to_target)},
@@ -505,41 +504,6 @@ std::vector<fs::path> write_check(const CheckResult& result, const Lens& lens,
   files.add(check_file::kReport, report_page(result, lens, options, map));
   files.add(check_file::kJson, check_json(result, lens, options).dump(2) + "\n");
   return files.publish();
-}
-
-Workshop fitted_workshop(const CheckResult& result, const Lens& lens, const CamOptions& options) {
-  Workshop workshop = options.workshop;
-  const int ball = finishing_ball(options).number;
-  for (const FoundCause& cause : result.fit.found) {
-    if (!cause.alternatives.empty()) continue;
-    switch (cause.deviation) {
-      case Deviation::kPolish:
-        workshop.polish.sigma *= std::exp(cause.value);
-        break;
-      case Deviation::kBall:
-        for (Tool& tool : workshop.tools) {
-          if (tool.number == ball) tool = resized(tool, tool.diameter * (1.0 + cause.value));
-        }
-        break;
-      case Deviation::kPitch:
-        workshop.process.finish.pitch_error += cause.value;
-        break;
-      case Deviation::kHaze: {
-        const double wavelength = kMmPerNm * options.wavelength_nm;
-        const double path = lens.setup.ior - 1.0;
-        const double share =
-            scattered_share({workshop.polish.roughness, workshop.polish.correlation}, path,
-                            wavelength) +
-            cause.value;
-        workshop.polish.roughness = std::sqrt(-std::log(1.0 - std::min(share, 0.99))) * wavelength /
-                                    (2.0 * std::numbers::pi * path) / kMmPerNm;
-        break;
-      }
-      default:
-        break;
-    }
-  }
-  return workshop;
 }
 
 }  // namespace lensforge

@@ -70,8 +70,4 @@ std::vector<std::filesystem::path> write_check(const CheckResult& result, const 
                                                const CamOptions& options,
                                                const std::filesystem::path& folder);
 
-/// The workshop with what a check found of it and can tell from other causes: polish.sigma,
-/// polish.roughness, the finishing ball's diameter and finish.pitch_error.
-Workshop fitted_workshop(const CheckResult& result, const Lens& lens, const CamOptions& options);
-
 }  // namespace lensforge

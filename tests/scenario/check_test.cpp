@@ -22,10 +22,9 @@ class BadPhotograph : public Scenario {
   void expect_refused(const Arguments& photos, const std::vector<std::string>& parts) const {
     Arguments arguments = {"check", path("lens")};
     arguments.insert(arguments.end(), photos.begin(), photos.end());
-    arguments.insert(arguments.end(), {"--out", path("check"), "--fit", path("mine.toml")});
+    arguments.insert(arguments.end(), {"--out", path("check")});
     expect_refusal(run(arguments), 2, parts);
     EXPECT_FALSE(fs::exists(at("check")));
-    EXPECT_FALSE(fs::exists(at("mine.toml")));
   }
 };
 

@@ -46,15 +46,15 @@ class CheckJob : public ::testing::Test {
   [[nodiscard]] CheckResult check(const Fault& fault, std::uint64_t seed) const {
     virtual_wall::Camera camera = virtual_wall::any_camera(seed);
     camera.yaw *= 0.5;
+    const virtual_wall::Workshop workshop(lens_, options_, executor_);
     const Image seen =
-        virtual_wall::photograph(workshop_.light(fault), lens_.setup.image_size, camera);
+        virtual_wall::photograph(workshop.light(fault), lens_.setup.image_size, camera);
     return check_photograph(lens_, options_, photograph(seen, {}, "wall.jpg"), executor_, {});
   }
 
   Lens lens_ = wavy_lens();
   CamOptions options_;
   Executor executor_ = Executor::cpu(2);
-  virtual_wall::Workshop workshop_{lens_, options_, executor_};
 };
 
 TEST_F(CheckJob, NamesNothingWhereNothingIsWrong) {
@@ -85,22 +85,7 @@ TEST_F(CheckJob, NamesTheLampAndWritesIt) {
   EXPECT_EQ(json["causes"][0]["cause"], "lamp_size");
   EXPECT_NEAR(json["causes"][0]["planned"], 5.0, 1e-9);
   EXPECT_EQ(json["measured"]["lamp_size"]["unit"], "mrad");
-  EXPECT_THAT(read_bytes(folder / check_file::kReport), HasSubstr("The lamp is"));
-  // Nothing of it is the workshop's.
-  const Workshop fitted = fitted_workshop(result, lens_, options_);
-  EXPECT_EQ(fitted.polish.sigma, options_.workshop.polish.sigma);
-}
-
-TEST_F(CheckJob, FittedWorkshopHasWhatIsCertain) {
-  CheckResult result;
-  FoundCause polish;
-  polish.deviation = Deviation::kPolish;
-  polish.value = std::log(1.3);
-  result.fit.found = {polish};
-  const double sigma = options_.workshop.polish.sigma;
-  EXPECT_NEAR(fitted_workshop(result, lens_, options_).polish.sigma, 1.3 * sigma, 1e-9);
-  result.fit.found.front().alternatives = {Deviation::kLampSize};
-  EXPECT_EQ(fitted_workshop(result, lens_, options_).polish.sigma, sigma);
+  EXPECT_THAT(read_bytes(folder / check_file::kReport), HasSubstr("Likeliest: the lamp is"));
 }
 
 /// Each in the words of the one who has to mend it.
