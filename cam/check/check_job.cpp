@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 /// Pixels of the photograph per pixel of the lens's picture that a fit compares: finer ones add
 /// nothing, since the picture has no finer detail.
 constexpr double kSeenPerPixel = 1.5;
-constexpr int kFine = 3;        ///< Twice that: SeenPixels::shown().
+constexpr int kFine = 5;        ///< XX
 constexpr double kReach = 1.2;  ///< Of the wall that is compared.
 
 /// Pixel coordinates at which a photograph shows a place on the wall: Newton's steps.

@@ -101,6 +101,35 @@ double lamp_angle(const OpticalSetup& setup) {
   return setup.extent.width / lamp_distance(setup).value_or(1.0);
 }
 
+namespace {
+
+/// Parts and pictures that are kept: a fit comes back to those around it.
+constexpr std::size_t kKeptParts = 3;
+constexpr std::size_t kKeptPictures = 24;
+
+/// Nodes of a part that are kept: 0.5 GB. Larger parts are polished anew for every picture.
+constexpr std::int64_t kMostNodes = 20'000'000;
+
+}  // namespace
+
+struct WallModel::Part {
+  Part(const PolishModel& polish, double ball_share, double pitch_error,
+       std::vector<BallPath> paths, const WallModel& model)
+      : sigma(polish.sigma),
+        ball(ball_share),
+        pitch(pitch_error),
+        milled(std::move(paths), model.blank_top_),
+        polished(milled, {Eigen::Vector2d(0.0, 0.0), model.wide_.lens_size}, polish),
+        held(polished) {}
+
+  double sigma, ball, pitch;
+  MilledField milled;
+  PolishedField polished;
+  HeldField held;
+};
+
+WallModel::~WallModel() = default;
+
 WallModel::WallModel(const Lens& lens, const CamOptions& options, int fine,
                      const Executor& executor, const RunControl& control)
     : lens_(lens),
@@ -116,55 +145,85 @@ WallModel::WallModel(const Lens& lens, const CamOptions& options, int fine,
     fault_ = "draws parts of surfaces without creases only";
     return;
   }
-  cut_part(cut_setup(lens, options), control);
+  plan_rows(cut_setup(lens, options), control);
+  misplaced_ = misplaced(control);
 }
 
 /// The path's decimals are left out: they move light by less than the fit of its moves.
-void WallModel::cut_part(const CutSetup& setup, const RunControl& control) {
+void WallModel::plan_rows(const CutSetup& setup, const RunControl& control) {
+  blank_top_ = setup.blank.max().z();
+  passes_ = setup.passes();
   const CutPasses passes = cut_passes(setup, executor_);
-  const AxisStretch stretch = AxisStretch::of(options_.workshop.process.finish);
-  std::vector<BallPath> paths;
   for (const FinishPass& pass : passes.finish) {
-    BallPath& path = paths.emplace_back(pass.tool.radius(), 0.0);
-    const MoveSink sink = path_sink(path, stretch);
-    const auto add = [&](const RasterRow& row) {
-      const PathMove start{MoveKind::kRapid, row.start};
-      sink({&start, 1});
-      sink(row.moves);
+    BallRows& ball = rows_.emplace_back(BallRows{pass.tool.radius(), {}});
+    const auto keep = [&](const RasterRow& row) {
+      if (control.stop_requested()) throw Interrupted();
+      ball.rows.push_back(row);
     };
-    if (!cut_raster(*pass.surface, pass.plan, executor_, add, control).complete) {
+    if (!cut_raster(*pass.surface, pass.plan, executor_, keep, control).complete) {
       throw Interrupted();
     }
   }
-  const MilledField milled(std::move(paths), setup.blank.max().z());
-  const PolishModel& polish = options_.workshop.polish;
-  passes_ = setup.passes();
-  const PartPlan plan{wide_, passes_, polish, kMostPolish * polish.sigma, setup.apron_on_lens()};
-  part_ = std::make_unique<PartModel>(milled, plan, executor_, control);
-  const PolishedField part(milled, {Eigen::Vector2d(0.0, 0.0), wide_.lens_size}, polish);
-  correction_ = hazed(haze_at(wide_, 0.0), light_of(part, control), wide_.pixels, executor_);
-  const std::vector<double> model = flux(Deviations::Zero());
-  for (std::size_t i = 0; i < model.size(); ++i) correction_[i] -= model[i];
 }
 
-/// Under every point of the lamp where the part is sampled at once, since a convolution misplaces
-/// 0.3 % of the light; else by that.
-std::vector<double> WallModel::light_of(const SurfaceField& part, const RunControl& control) const {
-  const HeldField held(part);
-  FieldRenderSetup render{
-      wide_, lens_grid(wide_.lens_size, sample_spacings(options_, lens_.setup, passes_))};
-  render.surface_height = height_;
-  const auto picture = [&](const OpticalSetup& light) {
-    render.optics = light;
-    render.whole.clear();
-    for (const LightColor& color : light_colors(light)) {
-      const LightPath path(color.setup);
-      if (!path.intake_is_plan_area()) render.whole.push_back(intake_of(lens_.surface, path));
+const WallModel::Part& WallModel::part(const Deviations& deviations) const {
+  PolishModel polish = options_.workshop.polish;
+  polish.sigma *= std::exp(deviations[index_of(Deviation::kPolish)]);
+  FinishProcess finish = options_.workshop.process.finish;
+  finish.pitch_error += deviations[index_of(Deviation::kPitch)];
+  const double ball = deviations[index_of(Deviation::kBall)];
+  for (const auto& part : parts_) {
+    if (part->sigma == polish.sigma && part->ball == ball && part->pitch == finish.pitch_error) {
+      return *part;
     }
-    return render_field(held, render, executor_, control).flux;
+  }
+  std::vector<BallPath> paths;
+  for (const BallRows& rows : rows_) {
+    BallPath& path = paths.emplace_back(rows.radius * (1.0 + ball), 0.0);
+    const MoveSink sink = path_sink(path, AxisStretch::of(finish));
+    for (const RasterRow& row : rows.rows) {
+      const PathMove start{MoveKind::kRapid, row.start};
+      sink({&start, 1});
+      sink(row.moves);
+    }
+  }
+  // The first is the forecast's, to which fits come back most often.
+  if (parts_.size() == kKeptParts) parts_.erase(parts_.begin() + 1);
+  parts_.push_back(
+      std::make_unique<const Part>(polish, ball, finish.pitch_error, std::move(paths), *this));
+  return *parts_.back();
+}
+
+std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& optics) const {
+  FieldRenderSetup render{
+      optics, lens_grid(optics.lens_size, sample_spacings(options_, lens_.setup, passes_))};
+  render.surface_height = height_;
+  for (const LightColor& color : light_colors(optics)) {
+    const LightPath path(color.setup);
+    if (!path.intake_is_plan_area()) render.whole.push_back(intake_of(lens_.surface, path));
+  }
+  if (render.grid.size() <= kMostNodes) {
+    render.tile = std::max(render.grid.columns, render.grid.rows);
+  }
+  return render_field(part.held, render, executor_, {}).flux;
+}
+
+/// Larger parts take too long under every point of a lamp.
+std::vector<double> WallModel::misplaced(const RunControl& control) const {
+  const Part& nominal = part(Deviations::Zero());
+  const auto picture = [&](const OpticalSetup& optics) {
+    if (control.stop_requested()) throw Interrupted();
+    return light_of(nominal, optics);
   };
-  if (std::max(render.grid.columns, render.grid.rows) > render.tile) return picture(wide_);
-  return picture_under(wide_, source_point_count(wide_, height_), picture);
+  std::vector<double> misplaced(static_cast<std::size_t>(wide_.pixels.prod()), 0.0);
+  const GridWindow grid =
+      lens_grid(wide_.lens_size, sample_spacings(options_, lens_.setup, passes_));
+  if (wide_.extent.none() || grid.size() > kMostNodes) return misplaced;
+  const std::vector<double> right =
+      picture_under(wide_, source_point_count(wide_, height_), picture, control);
+  const std::vector<double> seen = light_of(nominal, wide_);
+  for (std::size_t i = 0; i < seen.size(); ++i) misplaced[i] = right[i] - seen[i];
+  return misplaced;
 }
 
 bool WallModel::shows(Deviation deviation) const {
@@ -221,25 +280,27 @@ Haze WallModel::haze_at(const OpticalSetup& optics, double more) const {
 }
 
 std::vector<double> WallModel::flux(const Deviations& deviations) const {
-  const auto of = [&](Deviation d) { return deviations[index_of(d)]; };
   const OpticalSetup optics = optics_of(deviations);
-  const Haze haze = haze_at(optics, of(Deviation::kHaze));
-  if (!part_) return hazed(haze, flux_of_lens(lens_, optics, executor_), optics.pixels, executor_);
-  PartError error;
-  error.sigma_factor = std::exp(of(Deviation::kPolish));
-  error.radius = of(Deviation::kBall) * passes_.ball_radius;
-  error.stretch[1 - passes_.axis] = of(Deviation::kPitch);
-  return part_->render(error, optics, haze, executor_).flux;
+  std::vector<double> light = has_part() ? light_of(part(deviations), optics)
+                                         : flux_of_lens(lens_, optics, executor_);
+  for (std::size_t i = 0; i < misplaced_.size(); ++i) light[i] += misplaced_[i];
+  return hazed(haze_at(optics, deviations[index_of(Deviation::kHaze)]), light, optics.pixels,
+               executor_);
 }
 
 Image WallModel::picture(const Deviations& deviations) const {
   const DeviationLimits limits = deviation_limits(lens_.setup);
-  std::vector<double> light = flux(deviations.cwiseMax(limits.least).cwiseMin(limits.most));
-  for (std::size_t i = 0; i < correction_.size(); ++i) light[i] += correction_[i];
+  const Deviations within = deviations.cwiseMax(limits.least).cwiseMin(limits.most);
+  for (const auto& [at, image] : pictures_) {
+    if (at == within) return image;
+  }
+  const std::vector<double> light = flux(within);
   const double even = lens_.setup.pixels.cast<double>().prod() * fine_ * fine_;
   Image image(wide_.pixels.x(), wide_.pixels.y());
   std::transform(light.begin(), light.end(), image.values().begin(),
                  [&](double value) { return static_cast<float>(even * std::max(value, 0.0)); });
+  if (pictures_.size() == kKeptPictures) pictures_.erase(pictures_.begin() + 1);
+  pictures_.emplace_back(within, image);
   return image;
 }
 

@@ -7,11 +7,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cam/plan/cam_options.h"
+#include "cam/path/finish_raster.h"
 #include "cam/plan/cut_plan.h"
-#include "cam/tolerance/part_model.h"
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/lens/lens.h"
@@ -55,10 +56,12 @@ double lamp_angle(const OpticalSetup& setup);
 /// Distance of the lamp from the lens, mm; none for parallel light.
 std::optional<double> lamp_distance(const OpticalSetup& setup);
 
-/// Predicts pictures on the wall, with light around the picture's rectangle. The forecast is that
-/// of cam's chain: the finishing rows are planned and fitted anew, and what they leave is polished.
-/// Deviations change it as they change the picture of PartModel. Where parts cannot be drawn
-/// (tolerance_fault(), creases) it is the lens as designed.
+/// Predicts pictures on the wall, with light around the picture's rectangle, by cam's chain: the
+/// finishing rows are planned and fitted once; the balls that they move, with deviations, leave a
+/// surface (MilledField), which is polished (PolishedField) and rendered (render_field()). A lamp
+/// blurs the picture by a convolution; what that misplaces of the forecast is added to every
+/// picture. Where parts cannot be drawn (tolerance_fault(), creases) it is the lens as designed.
+/// Not for several threads at once: the last parts and pictures are kept.
 class WallModel {
  public:
   /// @param lens  must outlive this. @param options  with the workshop.
@@ -66,6 +69,9 @@ class WallModel {
   /// @throw Interrupted
   WallModel(const Lens& lens, const CamOptions& options, int fine, const Executor& executor,
             const RunControl& control);
+  WallModel(const WallModel&) = delete;
+  WallModel& operator=(const WallModel&) = delete;
+  ~WallModel();
 
   /// Irradiance relative to all light spread evenly over the picture. Deviations beyond
   /// deviation_limits() count as these. @throw Interrupted
@@ -74,7 +80,7 @@ class WallModel {
   [[nodiscard]] const Lens& lens() const { return lens_; }
   [[nodiscard]] const CamOptions& options() const { return options_; }
   /// False if the part's own deviations have no effect here.
-  [[nodiscard]] bool has_part() const { return part_ != nullptr; }
+  [[nodiscard]] bool has_part() const { return !rows_.empty(); }
   /// Why there is no part; empty if there is one.
   [[nodiscard]] const std::string& fault() const { return fault_; }
   /// True if the deviation can show at all.
@@ -84,13 +90,23 @@ class WallModel {
   [[nodiscard]] int fine() const { return fine_; }
 
  private:
-  void cut_part(const CutSetup& setup, const RunControl& control);
-  /// Shares of the light by cam's chain.
-  [[nodiscard]] std::vector<double> light_of(const SurfaceField& part,
-                                             const RunControl& control) const;
+  /// Rows that a ball of this radius cuts.
+  struct BallRows {
+    double radius = 0.0;  ///< mm
+    std::vector<RasterRow> rows;
+  };
+  /// A part as cut and polished.
+  struct Part;
+
+  void plan_rows(const CutSetup& setup, const RunControl& control);
+  [[nodiscard]] const Part& part(const Deviations& deviations) const;
+  /// Shares of the light of a part.
+  [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
+  /// What a convolution misplaces of the forecast, shares of the light.
+  [[nodiscard]] std::vector<double> misplaced(const RunControl& control) const;
   [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
   [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
-  /// Shares of the light by PartModel, or of the lens as designed.
+  /// Shares of the light, of the lens as designed where there is no part.
   [[nodiscard]] std::vector<double> flux(const Deviations& deviations) const;
 
   const Lens& lens_;
@@ -99,11 +115,14 @@ class WallModel {
   int margin_;
   OpticalSetup wide_;  ///< The lens's, with margin and fine pixels.
   double height_;      ///< Of the surface, mm.
+  double blank_top_ = 0.0;
   Passes passes_;
   std::string fault_;
-  std::unique_ptr<const PartModel> part_;
-  std::vector<double> correction_;  ///< The chain's forecast less that of the model.
+  std::vector<BallRows> rows_;  ///< Empty if there is no part.
+  std::vector<double> misplaced_;
   Executor executor_;
+  mutable std::vector<std::unique_ptr<const Part>> parts_;
+  mutable std::vector<std::pair<Deviations, Image>> pictures_;
 };
 
 }  // namespace lensforge

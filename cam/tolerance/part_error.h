@@ -84,7 +84,6 @@ struct PartError {
   Eigen::Vector2d tilt{0.0, 0.0};      ///< About x and y, rad.
   double source = 0.0;                 ///< Full angle, rad.
   double expansion = 0.0;              ///< Of all lengths of the part, a share.
-  Eigen::Vector2d stretch{0.0, 0.0};   ///< Of lengths along x and along y besides, shares.
 };
 
 /// Scale factor of each cause's Tolerances.

@@ -61,14 +61,12 @@ PartLight::PartLight(const OpticalSetup& setup, const PartError& error)
     : seen_(seen_by_part(setup, error)),
       light_(seen_),
       centre_(centre_of(setup)),
-      growth_((1.0 + error.expansion) *
-              Eigen::Vector3d(1.0 + error.stretch.x(), 1.0 + error.stretch.y(), 1.0)),
+      growth_(1.0 + error.expansion),
       straight_(is_straight(setup)),
       screen_(setup.focal_length + error.distance) {}
 
 Eigen::Vector2d PartLight::land(const Eigen::Vector3d& point, const Eigen::Vector2d& slope) const {
-  const Eigen::Vector3d n =
-      Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).cwiseQuotient(growth_).normalized();
+  const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
   if (!light_.transmits(point, n)) {
     return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
@@ -76,7 +74,7 @@ Eigen::Vector2d PartLight::land(const Eigen::Vector3d& point, const Eigen::Vecto
 }
 
 double PartLight::whole(const PartNodes& nodes) const {
-  if (straight_) return seen_.lens_size.prod() * growth_.x() * growth_.y();
+  if (straight_) return seen_.lens_size.prod() * growth_ * growth_;
   const auto place = [&](std::size_t n) {
     return grown(nodes.places[n].head<2>(), nodes.places[n].z());
   };

@@ -22,14 +22,14 @@ struct PartNodes {
 
 /// Light path to the screen through a part with errors: turned about its centre, with another
 /// refractive index, grown, and with the screen farther away along its own axis. Lamp and screen
-/// stay in place. Slopes are those of the part before it grew.
+/// stay in place.
 class PartLight {
  public:
   PartLight(const OpticalSetup& setup, const PartError& error);
 
   /// A point of the grown part, from its place and height in the lens frame, mm.
   [[nodiscard]] Eigen::Vector3d grown(const Eigen::Vector2d& place, double z) const {
-    return centre_ + growth_.cwiseProduct(Eigen::Vector3d(place.x(), place.y(), z) - centre_);
+    return centre_ + growth_ * (Eigen::Vector3d(place.x(), place.y(), z) - centre_);
   }
   /// Landing place of the ray from such a point, in pixel coordinates; NaN if it misses the screen.
   [[nodiscard]] Eigen::Vector2d land(const Eigen::Vector3d& point,
@@ -55,7 +55,7 @@ class PartLight {
   OpticalSetup seen_;  ///< In the part's own frame.
   LightPath light_;
   Eigen::Vector3d centre_;
-  Eigen::Vector3d growth_;
+  double growth_;
   bool straight_;
   double screen_;  ///< z of a screen parallel to the part, mm.
 };

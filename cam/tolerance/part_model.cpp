@@ -730,13 +730,10 @@ PartModel::PartModel(const SurfaceField& cut, const PartPlan& plan, const Execut
       lit_(light_nodes(base_)) {}
 
 FluxPicture PartModel::render(const PartError& error, const Executor& executor) const {
-  return render(error, plan_.optics, plan_.haze.times(error.roughness_factor), executor);
-}
-
-FluxPicture PartModel::render(const PartError& error, const OpticalSetup& optics, const Haze& haze,
-                              const Executor& executor) const {
+  const OpticalSetup& optics = plan_.optics;
   const auto sharp = [&](const OpticalSetup& point) { return clear(error, point, executor).flux; };
   const std::vector<double> flux = picture_by_convolution(optics, mean_height_, sharp, executor);
+  const Haze haze = plan_.haze.times(error.roughness_factor);
   return {optics.pixels.x(), optics.pixels.y(), hazed(haze, flux, optics.pixels, executor)};
 }
 

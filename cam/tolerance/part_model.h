@@ -122,11 +122,6 @@ class PartModel {
   /// Interrupted
   [[nodiscard]] FluxPicture render(const PartError& error, const Executor& executor) const;
 
-  /// The same in other light or on another screen, with haze of its own.
-  /// @param optics  with the plan's lens size and body; pixels at most as fine as the plan's.
-  [[nodiscard]] FluxPicture render(const PartError& error, const OpticalSetup& optics,
-                                   const Haze& haze, const Executor& executor) const;
-
   [[nodiscard]] const PartPlan& plan() const { return plan_; }
 
  private:

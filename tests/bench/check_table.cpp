@@ -123,7 +123,7 @@ class Bench {
       : lens_(lens),
         folder_(std::move(folder)),
         workshop_(lens, options_, executor_),
-        model_(lens, options_, 3, executor_, {}) {}
+        model_(lens, options_, 5, executor_, {}) {}
 
   [[nodiscard]] virtual_wall::WallLight light(const Fault& fault) const {
     return workshop_.light(fault);

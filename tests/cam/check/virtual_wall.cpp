@@ -24,7 +24,8 @@ constexpr int kFine = 8;          ///< Pixels of the wall per pixel of the pictu
 constexpr double kMargin = 0.25;  ///< Of the wall beyond each side.
 constexpr int kLampPoints = 24;
 
-/// Points of an evenly lit disc of diameter 1: a sunflower's.
+/// Points of an evenly lit disc of diameter 1: a sunflower's. Each stands for its share of the disc,
+/// which is blurred (disc_share()): bare points would leave as many sharp pictures.
 std::vector<Eigen::Vector2d> disc_points() {
   std::vector<Eigen::Vector2d> points;
   for (int k = 0; k < kLampPoints; ++k) {
@@ -34,6 +35,9 @@ std::vector<Eigen::Vector2d> disc_points() {
   }
   return points;
 }
+
+/// Standard deviation along an axis of the part of a disc that a point stands for, in diameters.
+double disc_share() { return 0.25 / std::sqrt(kLampPoints); }
 
 /// The same lamp, but one of its points.
 OpticalSetup at_point(OpticalSetup setup, const Eigen::Vector2d& point) {
@@ -146,8 +150,14 @@ WallLight Workshop::light(const Fault& fault) const {
       sum[i] += picture.flux[i] / static_cast<double>(points.size());
     }
   }
+  const double pixel = wall.image_size.x() / wall.pixels.x();
+  if (width > 0.0) {
+    const auto place = lamp_place(wall.lamp);
+    const double angle = width / (place ? place->norm() : 1.0);
+    sum = gaussian(sum, wall.pixels.x(), wall.pixels.y(),
+                   disc_share() * angle * wall.focal_length / pixel);
+  }
   if (fault.haze > 0.0) {
-    const double pixel = wall.image_size.x() / wall.pixels.x();
     const std::vector<double> wide =
         gaussian(sum, wall.pixels.x(), wall.pixels.y(), 0.02476 * wall.focal_length / pixel);
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += fault.haze * (wide[i] - sum[i]);
