@@ -18,8 +18,7 @@ struct FoundCause {
   /// By how much the photograph is likelier with it, in ln likelihood times 2, less the cost of a
   /// cause.
   double evidence = 0.0;
-  /// Deviations that would explain the same nearly as well in its place, or that a photograph
-  /// without a scale cannot tell from it: distance, index and distance of the lamp.
+  /// Deviations that would explain the same nearly as well in its place.
   std::vector<Deviation> alternatives;
 };
 
@@ -37,8 +36,9 @@ struct CauseFit {
 
 /// Finds the set of causes with the most evidence, less what speaks against so many and so large
 /// ones beforehand: all sets are compared to first order, the best few are fitted together with the
-/// view by Gauss-Newton steps over pictures that are predicted anew, and all are compared again
-/// around it, with one more cause allowed each time, until none is better.
+/// view by Gauss-Newton steps over pictures that are predicted anew (a polish also from a weaker
+/// one), and all are compared again around it, with one more cause allowed each time, until none is
+/// better.
 /// @param view  find_picture()'s. @throw Interrupted
 CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
                      const RunControl& control);

@@ -17,7 +17,6 @@
 #include "core/optics/light_path.h"
 #include "core/optics/polish_transfer.h"
 #include "design/render.h"
-#include "design/render/source_picture.h"
 
 namespace lensforge {
 namespace {
@@ -146,7 +145,6 @@ WallModel::WallModel(const Lens& lens, const CamOptions& options, int fine,
     return;
   }
   plan_rows(cut_setup(lens, options), control);
-  misplaced_ = misplaced(control);
 }
 
 /// The path's decimals are left out: they move light by less than the fit of its moves.
@@ -208,24 +206,6 @@ std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& op
   return render_field(part.held, render, executor_, {}).flux;
 }
 
-/// Larger parts take too long under every point of a lamp.
-std::vector<double> WallModel::misplaced(const RunControl& control) const {
-  const Part& nominal = part(Deviations::Zero());
-  const auto picture = [&](const OpticalSetup& optics) {
-    if (control.stop_requested()) throw Interrupted();
-    return light_of(nominal, optics);
-  };
-  std::vector<double> misplaced(static_cast<std::size_t>(wide_.pixels.prod()), 0.0);
-  const GridWindow grid =
-      lens_grid(wide_.lens_size, sample_spacings(options_, lens_.setup, passes_));
-  if (wide_.extent.none() || grid.size() > kMostNodes) return misplaced;
-  const std::vector<double> right =
-      picture_under(wide_, source_point_count(wide_, height_), picture, control);
-  const std::vector<double> seen = light_of(nominal, wide_);
-  for (std::size_t i = 0; i < seen.size(); ++i) misplaced[i] = right[i] - seen[i];
-  return misplaced;
-}
-
 bool WallModel::shows(Deviation deviation) const {
   switch (deviation) {
     case Deviation::kPolish:
@@ -281,9 +261,8 @@ Haze WallModel::haze_at(const OpticalSetup& optics, double more) const {
 
 std::vector<double> WallModel::flux(const Deviations& deviations) const {
   const OpticalSetup optics = optics_of(deviations);
-  std::vector<double> light = has_part() ? light_of(part(deviations), optics)
-                                         : flux_of_lens(lens_, optics, executor_);
-  for (std::size_t i = 0; i < misplaced_.size(); ++i) light[i] += misplaced_[i];
+  const std::vector<double> light =
+      has_part() ? light_of(part(deviations), optics) : flux_of_lens(lens_, optics, executor_);
   return hazed(haze_at(optics, deviations[index_of(Deviation::kHaze)]), light, optics.pixels,
                executor_);
 }

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "cam/plan/cam_options.h"
 #include "cam/path/finish_raster.h"
+#include "cam/plan/cam_options.h"
 #include "cam/plan/cut_plan.h"
 #include "core/compute/executor.h"
 #include "core/image/image.h"
@@ -58,9 +58,9 @@ std::optional<double> lamp_distance(const OpticalSetup& setup);
 
 /// Predicts pictures on the wall, with light around the picture's rectangle, by cam's chain: the
 /// finishing rows are planned and fitted once; the balls that they move, with deviations, leave a
-/// surface (MilledField), which is polished (PolishedField) and rendered (render_field()). A lamp
-/// blurs the picture by a convolution; what that misplaces of the forecast is added to every
-/// picture. Where parts cannot be drawn (tolerance_fault(), creases) it is the lens as designed.
+/// surface (MilledField), which is polished (PolishedField) and rendered (render_field(), a lamp
+/// with a width by a convolution). Where parts cannot be drawn (tolerance_fault(), creases) it is
+/// the lens as designed.
 /// Not for several threads at once: the last parts and pictures are kept.
 class WallModel {
  public:
@@ -102,8 +102,6 @@ class WallModel {
   [[nodiscard]] const Part& part(const Deviations& deviations) const;
   /// Shares of the light of a part.
   [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
-  /// What a convolution misplaces of the forecast, shares of the light.
-  [[nodiscard]] std::vector<double> misplaced(const RunControl& control) const;
   [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
   [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
   /// Shares of the light, of the lens as designed where there is no part.
@@ -119,7 +117,6 @@ class WallModel {
   Passes passes_;
   std::string fault_;
   std::vector<BallRows> rows_;  ///< Empty if there is no part.
-  std::vector<double> misplaced_;
   Executor executor_;
   mutable std::vector<std::unique_ptr<const Part>> parts_;
   mutable std::vector<std::pair<Deviations, Image>> pictures_;

@@ -247,10 +247,13 @@ WallPicture::Light SeenPixels::seen_light(const Eigen::VectorXd& view, const Wal
   const Eigen::Vector2d across = Eigen::Vector2d(x, slant).cwiseQuotient(side);
   const Eigen::Vector2d down = Eigen::Vector2d(0.0, y).cwiseQuotient(side);
   WallPicture::Light mean;
-  for (const auto& [a, b] : {std::pair(-1.0, -1.0), {1.0, -1.0}, {-1.0, 1.0}, {1.0, 1.0}}) {
-    const WallPicture::Light light = wall.at(at + a * across + b * down);
-    mean.value += 0.25 * light.value;
-    mean.gradient += 0.25 * light.gradient;
+  const double far = std::sqrt(1.5);  // Three places with a variance of 1.
+  for (const double a : {-far, 0.0, far}) {
+    for (const double b : {-far, 0.0, far}) {
+      const WallPicture::Light light = wall.at(at + a * across + b * down);
+      mean.value += light.value / 9.0;
+      mean.gradient += light.gradient / 9.0;
+    }
   }
   return mean;
 }

@@ -87,7 +87,7 @@ class SeenPixels {
   SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, double reach);
 
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(places_.size()); }
-  /// Display values that the view makes of a picture: the mean of four places in every pixel, with
+  /// Display values that the view makes of a picture: the mean of nine places in every pixel, with
   /// the variance of the pixel on the wall where it is wider than the picture's.
   [[nodiscard]] Eigen::VectorXd shown(const Eigen::VectorXd& view, const WallPicture& wall) const;
   /// Their derivatives by the view's values; those of light by its middle.

@@ -6,10 +6,8 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <string>
 
-#include "cam/cam_meshes.h"
 #include "cam/check/virtual_wall.h"
 #include "core/temp_folder.h"
 
@@ -20,25 +18,6 @@ using lensforge::testing::read_bytes;
 using lensforge::testing::TempFolder;
 using ::testing::HasSubstr;
 using virtual_wall::Fault;
-
-/// A lens of 4 mm whose picture has no symmetry: waves that gather light up to about twice.
-Lens wavy_lens() {
-  constexpr double kTwoPi = 2.0 * std::numbers::pi;
-  Lens lens;
-  lens.model = SurfaceModel::kSmooth;
-  lens.setup.lens_size = {4.0, 4.0};
-  lens.setup.image_size = {4.0, 4.0};
-  lens.setup.pixels = {32, 32};
-  lens.setup.focal_length = 16.0;
-  lens.setup.extent.width = 5e-3;
-  lens.surface = testing::grid_mesh(81, 81, 4.0, 4.0, [](double x, double y) {
-    return 2.0 + 0.0035 * std::sin(kTwoPi * x / 1.7 + 0.3) * std::cos(kTwoPi * y / 2.3) +
-           0.0025 * std::sin(kTwoPi * (x + 0.7 * y) / 1.5) +
-           0.0015 * std::cos(kTwoPi * (0.4 * x - y) / 1.1 + 1.0);
-  });
-  lens.target = Image(32, 32, 1.0F);
-  return lens;
-}
 
 /// What `check` says of a virtual photograph.
 class CheckJob : public ::testing::Test {
@@ -52,7 +31,7 @@ class CheckJob : public ::testing::Test {
     return check_photograph(lens_, options_, photograph(seen, {}, "wall.jpg"), executor_, {});
   }
 
-  Lens lens_ = wavy_lens();
+  Lens lens_ = virtual_wall::wavy_lens();
   CamOptions options_;
   Executor executor_ = Executor::cpu(2);
 };

@@ -10,6 +10,7 @@
 #include <utility>
 #include <variant>
 
+#include "cam/cam_meshes.h"
 #include "cam/leakage/render_field.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
@@ -20,24 +21,36 @@
 namespace lensforge::virtual_wall {
 namespace {
 
-constexpr int kFine = 8;          ///< Pixels of the wall per pixel of the picture.
 constexpr double kMargin = 0.25;  ///< Of the wall beyond each side.
-constexpr int kLampPoints = 24;
 
-/// Points of an evenly lit disc of diameter 1: a sunflower's. Each stands for its share of the disc,
-/// which is blurred (disc_share()): bare points would leave as many sharp pictures.
-std::vector<Eigen::Vector2d> disc_points() {
-  std::vector<Eigen::Vector2d> points;
-  for (int k = 0; k < kLampPoints; ++k) {
-    const double r = 0.5 * std::sqrt((k + 0.5) / kLampPoints);
-    const double t = k * std::numbers::pi * (3.0 - std::sqrt(5.0));
-    points.emplace_back(r * std::cos(t), r * std::sin(t));
+/// A point of a disc of diameter 1, and its share of the light.
+struct LampPoint {
+  Eigen::Vector2d at{0.0, 0.0};
+  double share = 0.0;
+};
+
+/// Standard deviation along an axis of the Gaussian that each point stands for: that of an even
+/// part of the disc. Bare points would leave as many sharp pictures.
+constexpr double kPointWidth = 0.05;
+
+/// An evenly lit disc: three rings at Gauss's places for r², whose moments with the points' width
+/// are the disc's.
+std::vector<LampPoint> disc_points() {
+  constexpr int kAround = 8;
+  constexpr std::array<std::pair<double, double>, 3> kRings = {
+      {{0.11270166537925831, 5.0 / 18.0}, {0.5, 8.0 / 18.0}, {0.8872983346207417, 5.0 / 18.0}}};
+  const double narrower = std::sqrt(1.0 - 16.0 * kPointWidth * kPointWidth);
+  std::vector<LampPoint> points;
+  for (std::size_t ring = 0; ring < kRings.size(); ++ring) {
+    const auto& [square, share] = kRings[ring];
+    const double r = 0.5 * narrower * std::sqrt(square);
+    for (int k = 0; k < kAround; ++k) {
+      const double t = (k + 0.5 * static_cast<double>(ring % 2)) * 2.0 * std::numbers::pi / kAround;
+      points.push_back({{r * std::cos(t), r * std::sin(t)}, share / kAround});
+    }
   }
   return points;
 }
-
-/// Standard deviation along an axis of the part of a disc that a point stands for, in diameters.
-double disc_share() { return 0.25 / std::sqrt(kLampPoints); }
 
 /// The same lamp, but one of its points.
 OpticalSetup at_point(OpticalSetup setup, const Eigen::Vector2d& point) {
@@ -103,6 +116,24 @@ std::vector<double> gaussian(const std::vector<double>& light, int columns, int 
 
 }  // namespace
 
+Lens wavy_lens() {
+  constexpr double kTwoPi = 2.0 * std::numbers::pi;
+  Lens lens;
+  lens.model = SurfaceModel::kSmooth;
+  lens.setup.lens_size = {4.0, 4.0};
+  lens.setup.image_size = {4.0, 4.0};
+  lens.setup.pixels = {32, 32};
+  lens.setup.focal_length = 16.0;
+  lens.setup.extent.width = 5e-3;
+  lens.surface = lensforge::testing::grid_mesh(81, 81, 4.0, 4.0, [](double x, double y) {
+    return 2.0 + 0.0035 * std::sin(kTwoPi * x / 1.7 + 0.3) * std::cos(kTwoPi * y / 2.3) +
+           0.0025 * std::sin(kTwoPi * (x + 0.7 * y) / 1.5) +
+           0.0015 * std::cos(kTwoPi * (0.4 * x - y) / 1.1 + 1.0);
+  });
+  lens.target = Image(32, 32, 1.0F);
+  return lens;
+}
+
 Workshop::Workshop(const Lens& lens, const CamOptions& options, const Executor& executor)
     : lens_(lens), options_(options), executor_(executor), setup_(cut_setup(lens, options)) {
   const CutPasses passes = cut_passes(setup_, executor);
@@ -141,21 +172,19 @@ WallLight Workshop::light(const Fault& fault) const {
   setup.tile = 100000;
   std::vector<double> sum(static_cast<std::size_t>(wall.pixels.prod()), 0.0);
   const double width = wall.extent.width * (1.0 + fault.lamp);
-  const std::vector<Eigen::Vector2d> points =
-      width > 0.0 ? disc_points() : std::vector<Eigen::Vector2d>{{0.0, 0.0}};
-  for (const Eigen::Vector2d& point : points) {
-    setup.optics = at_point(wall, width * point);
+  const std::vector<LampPoint> points =
+      width > 0.0 ? disc_points() : std::vector<LampPoint>{{{0.0, 0.0}, 1.0}};
+  for (const LampPoint& point : points) {
+    setup.optics = at_point(wall, width * point.at);
     const FluxPicture picture = render_field(part, setup, executor_, {});
-    for (std::size_t i = 0; i < sum.size(); ++i) {
-      sum[i] += picture.flux[i] / static_cast<double>(points.size());
-    }
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += point.share * picture.flux[i];
   }
   const double pixel = wall.image_size.x() / wall.pixels.x();
   if (width > 0.0) {
     const auto place = lamp_place(wall.lamp);
     const double angle = width / (place ? place->norm() : 1.0);
     sum = gaussian(sum, wall.pixels.x(), wall.pixels.y(),
-                   disc_share() * angle * wall.focal_length / pixel);
+                   kPointWidth * angle * wall.focal_length / pixel);
   }
   if (fault.haze > 0.0) {
     const std::vector<double> wide =

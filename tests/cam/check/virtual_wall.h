@@ -14,12 +14,14 @@
 #include "core/image/image.h"
 #include "core/lens/lens.h"
 
-/// A workshop, a lamp, a wall and a camera that do not exist, for tests of `check`. What faults do
-/// is not shared with its fit: here the paths are cut anew, polished and rendered by cam's chain
-/// (MilledField, PolishedField, render_field()) under many points of a lamp; the fit moves the
-/// picture of PartModel. Without faults both rest on that chain and the same planned rows, so that
-/// errors of the forecast itself do not show. The camera is a pinhole with Brown's distortion.
+/// A workshop, a lamp, a wall and a camera that do not exist, for tests of `check`. Parts are made
+/// by cam's chain (MilledField, PolishedField, render_field()) from planned rows, as in its fit, so
+/// that errors of the chain itself do not show. Lamps are sums of points here, a convolution there;
+/// haze and the camera, a pinhole with Brown's distortion, share nothing with the fit.
 namespace lensforge::virtual_wall {
+
+/// A lens of 4 mm whose picture has no symmetry: waves that gather light up to about twice.
+Lens wavy_lens();
 
 /// What is wrong. All 0: nothing.
 struct Fault {
@@ -33,6 +35,8 @@ struct Fault {
   double pitch_error = 0.0;  ///< Across the rows, a share.
   double haze = 0.0;         ///< Share of the light that is scattered, 25 mrad wide.
 };
+
+inline constexpr int kFine = 8;  ///< Pixels of the wall per pixel of the picture.
 
 /// Irradiance of a part of the wall around the picture; 1: all light evenly on the picture.
 struct WallLight {
