@@ -98,7 +98,7 @@ TEST_F(TwoFaces, WhatTheyCannotHaveIsRefusedInOneLine) {
   const Outcome alone = run({"design", picture("rings.png"), "--second-focal", "90mm", "--pixels",
                              "16", "--out", path("lens")});
   expect_refusal(alone, 2, {"--second-focal 90", "needs --second PICTURE"});
-  const Outcome other = run({"design", picture("rings.png"), "--second", picture("text.png"),
+  const Outcome other = run({"design", picture("rings.png"), "--second", picture("calligraphy.png"),
                              "--second-focal", "900mm", "--out", path("lens")});
   expect_refusal(other, 2, {"--second ", "same proportions"});
 }

@@ -219,7 +219,7 @@ TEST(SetupJson, ASecondScreenThatCannotBeIsRefusedWithItsField) {
     return message_of<InputError>([&] { validate(read_setup(JsonFields(document, "lens.json"))); });
   };
   EXPECT_THAT(refusal_of("centre", {0, 0, 731.3}), HasSubstr("somewhere else"));
-  EXPECT_THAT(refusal_of("centre", {50.0, 50.0, -3}), HasSubstr("second: focal_length -3"));
+  EXPECT_THAT(refusal_of("centre", {50.0, 50.0, -3}), HasSubstr("second: focal_length is -3"));
   EXPECT_THAT(refusal_of("up", {0, 0, 2}), HasSubstr("second: "));
 }
 
