@@ -297,8 +297,8 @@ inline constexpr double kMiddleWavelength = 550.0 * kMmPerNm;
 /// Light as a scalar wave.
 struct WaveOptions {
   double wavelength = kMiddleWavelength;  ///< In air, mm, > 0; of a setup without a spectrum.
-  /// Angles along x and y within which the surfaces scatter beside their rays, rad: λ / pitch across
-  /// a tool's rows.
+  /// Angles along x and y within which the surfaces scatter beside their rays, rad: λ / pitch
+  /// across a tool's rows.
   Eigen::Vector2d scatter{0.0, 0.0};
   /// Side of the tiles into which the lens is divided, and width over which neighbours overlap, in
   /// lengths over which waves interfere: λ f / pixel, at least √(λ f). With 0 the lens is one
