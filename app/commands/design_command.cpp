@@ -586,7 +586,7 @@ CommandResult finish(CommandFrame& frame, const ChosenDevice& device,
   if (done) {
     outcome.notes.push_back("look at " + (folder / lens_file::kOverview).string() +
                             "; then: " + making_words(settings, folder));
-  } else {
+  } else if (!design.second.picture) {
     outcome.notes.emplace_back(kContinueWithResume);
   }
   return outcome;

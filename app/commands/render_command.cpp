@@ -376,10 +376,20 @@ Rendering rendered(const Scene& scene, const Executor& executor) {
   return scene.target ? compare_models(scene, executor) : render_alone(scene, executor);
 }
 
-/// Adds the picture on a lens's second screen; its file is named after the first's.
+/// True if the scene has a second screen, and a surface that its picture is rendered of.
+bool shows_second(const Scene& scene) {
+  return scene.second && scene.spline && scene.render.model == SurfaceModel::kSpline;
+}
+
+/// The file of the picture on the second screen, named after the first's.
+fs::path second_file(const fs::path& out) {
+  return out.parent_path() / (out.stem().string() + "_second" + out.extension().string());
+}
+
+/// Adds the picture on a lens's second screen.
 void add_second(const Scene& scene, const std::string& out, const Executor& executor,
                 CommandFrame& frame, Rendering& rendering) {
-  if (!scene.second || !scene.spline || scene.render.model != SurfaceModel::kSpline) return;
+  if (!shows_second(scene)) return;
   const OpticalSetup setup = on_second_screen(scene.render.setup);
   const Image target = resample(scene.second->target, setup.pixels.x(), setup.pixels.y());
   Image picture;
@@ -388,12 +398,8 @@ void add_second(const Scene& scene, const std::string& out, const Executor& exec
   rendering.json["second"] = {{"metrics", metrics_json(metrics)}};
   rendering.text += "  second  " + metrics_text(metrics) + "\n";
   if (out.empty()) return;
-  const fs::path first(out);
-  const fs::path file =
-      first.parent_path() / (first.stem().string() + "_second" + first.extension().string());
-  require_replaceable("--out", file.string(), frame.options().given("--force"));
-  write_image(picture, file, frame.control());
-  rendering.json["second"]["out"] = file.string();
+  write_image(picture, second_file(out), frame.control());
+  rendering.json["second"]["out"] = second_file(out).string();
 }
 
 void require_picture_name(const std::string& out) {
@@ -426,6 +432,9 @@ CommandResult run(CommandFrame& frame, RenderArguments& arguments) {
   if (!arguments.out.empty()) require_replaceable("--out", arguments.out, arguments.force);
   frame.begin_file(arguments.out);
   const Scene scene = adjusted(load(arguments.source, frame), frame, arguments);
+  if (!arguments.out.empty() && shows_second(scene)) {
+    require_replaceable("--out", second_file(arguments.out), arguments.force);
+  }
   const ChosenDevice device = frame.device_executor();
   frame.control().report({"picture", 0.0, 0.0, ""});
   Rendering rendering = rendered(scene, device.executor);

@@ -12,9 +12,7 @@
 
 #include "core/error.h"
 #include "core/spline/control_net.h"
-#include "core/text/number_text.h"
 #include "design/render.h"
-#include "design/schedule/face_transport.h"
 #include "design/schedule/two_face_stage.h"
 
 namespace lensforge {
