@@ -31,7 +31,7 @@ constexpr double kSeenPerPixel = 1.5;
 /// Pixels of the prediction per pixel of the lens's picture: with 3 the noise-free photograph of a
 /// forecast left twice as much, 0.0044 in place of 0.0026 of a display value.
 constexpr int kFine = 5;
-constexpr double kReach = 1.2;  ///< Of the wall that is compared.
+constexpr double kCompared = 1.2;  ///< Of the wall that is compared.
 
 /// Pixel coordinates at which a photograph shows a place on the wall: Newton's steps.
 class WallToPhoto {
@@ -167,7 +167,7 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options, const 
   result.seen_pixels = pixels_across(photo, found);
   const Photograph less =
       shrunk(photo, result.seen_pixels / (kSeenPerPixel * lens.setup.pixels.x()));
-  result.fit = find_causes(model, SeenPixels(less, found, kReach), found, control);
+  result.fit = find_causes(model, SeenPixels(less, found, kCompared), found, control);
   result.rectified = rectified(less, result.fit.view, lens.target);
   result.unusable = clipped_share(photo, result.fit.view, lens.target);
   const int margin = forecast.margin;
