@@ -23,7 +23,7 @@ namespace {
 using testing::Random;
 using testing::sample_spline;
 
-constexpr int kSamples = 2;
+constexpr int kFaceSamples = 2;
 constexpr GridShape kFront{9, 7};
 
 /// A lens of 15 × 10 mm before a near screen and a far, tilted one.
@@ -31,7 +31,7 @@ class TwoFaces : public ::testing::Test {
  protected:
   TwoFaces() {
     options_.model = SurfaceModel::kSpline;
-    options_.samples = kSamples;
+    options_.samples = kFaceSamples;
     options_.weights.smooth = 0.0;
     options_.weights.barrier = 1e-2;
     options_.area = {0.01 * mean_, 0.9 * mean_};  // So wide that the barrier acts.
@@ -86,7 +86,7 @@ class TwoFaces : public ::testing::Test {
   ScreenGoal near_;
   ScreenGoal far_;
   LensFaces faces_;
-  double mean_ = 150.0 / (2.0 * kSamples * kSamples * 11.0 * 8.0);
+  double mean_ = 150.0 / (2.0 * kFaceSamples * kFaceSamples * 11.0 * 8.0);
   ObjectiveOptions options_;
 };
 
@@ -123,7 +123,7 @@ TEST_F(TwoFaces, PicturesAreThoseThatTheRendererMakes) {
   LensFaces gradient;
   ASSERT_TRUE(function.evaluate(faces_, gradient).feasible);
   const std::vector<double> errors = function.errors();
-  const SampledSurface nodes = spline_nodes({sample_spline().shape, faces_.exit}, kSamples);
+  const SampledSurface nodes = spline_nodes({sample_spline().shape, faces_.exit}, kFaceSamples);
   for (const auto& [goal, error] : {std::pair{near_, errors[0]}, {far_, errors[1]}}) {
     OpticalSetup setup = goal.setup;
     setup.front = height_front(faces_.front, setup.lens_size);
