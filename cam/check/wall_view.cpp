@@ -78,6 +78,7 @@ double exposure_ratio(const Photograph& shorter, const Photograph& longer) {
 
 Photograph bracketed(const std::vector<Photograph>& exposures) {
   std::vector<const Photograph*> order;
+  order.reserve(exposures.size());
   for (const Photograph& one : exposures) order.push_back(&one);
   std::stable_sort(order.begin(), order.end(), [](const Photograph* a, const Photograph* b) {
     return a->light.total() < b->light.total();
