@@ -78,9 +78,10 @@ Image rectified(const Photograph& photo, const Eigen::VectorXd& view, const Imag
     for (int c = 0; c < picture.columns(); ++c) {
       double sum = 0.0;
       for (int k = 0; k < kParts * kParts; ++k) {
-        const Eigen::Vector2d wall(
-            2.0 * (c + (k % kParts + 0.5) / kParts) / picture.columns() - 1.0,
-            2.0 * (r + (k / kParts + 0.5) / kParts) / picture.rows() - 1.0);
+        const int across = k % kParts;
+        const int down = k / kParts;
+        const Eigen::Vector2d wall(2.0 * (c + (across + 0.5) / kParts) / picture.columns() - 1.0,
+                                   2.0 * (r + (down + 0.5) / kParts) / picture.rows() - 1.0);
         const Eigen::Vector2d pixel = seen.at(wall);
         sum += seen.light(pixel, bilinear(photo.light, pixel));
       }
@@ -416,7 +417,8 @@ ColorImage difference_map(const Image& seen, const Image& forecast) {
   ColorImage map{scale * seen.columns(), scale * seen.rows(), {}};
   for (int r = 0; r < map.rows; ++r) {
     for (int c = 0; c < map.columns; ++c) {
-      const auto i = static_cast<std::size_t>((r / scale) * seen.columns() + c / scale);
+      const int pixel = (r / scale) * seen.columns() + c / scale;
+      const auto i = static_cast<std::size_t>(pixel);
       const double off = std::clamp((one[i] - other[i]) / kFull, -1.0, 1.0);
       const auto rest = static_cast<unsigned char>(std::lround(255.0 * (1.0 - std::abs(off))));
       map.rgb.push_back(off > 0.0 ? 255 : rest);

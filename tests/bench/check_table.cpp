@@ -146,7 +146,7 @@ class Bench {
     const Eigen::VectorXd view = find_picture(photo, wall_picture(model_, Deviations::Zero()));
     const Photograph less =
         shrunk(photo, pixels_across(photo, view) / (1.5 * lens_.setup.pixels.x()));
-    const CauseFit fit = find_causes(model_, SeenPixels(less, view, 1.2), view, {});
+    CauseFit fit = find_causes(model_, SeenPixels(less, view, 1.2), view, {});
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     std::cerr << name << ", camera " << seed << " (yaw " << number_text(camera.yaw, 2) << ", pitch "
@@ -282,8 +282,8 @@ void run(const Lens& lens, int each, int pairs, int without, const std::string& 
   Confusion confusion;
   std::vector<CauseFit> nothing;
   const virtual_wall::WallLight light = bench.light({});
-  for (int k = 0; k < without; ++k) {
-    nothing.push_back(bench.run(light, static_cast<std::uint64_t>(k + 1), "nothing"));
+  for (int k = 1; k <= without; ++k) {
+    nothing.push_back(bench.run(light, static_cast<std::uint64_t>(k), "nothing"));
     ++confusion["nothing"][first_of(nothing.back())];
   }
   print_alone(nothing);

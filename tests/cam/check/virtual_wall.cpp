@@ -101,13 +101,15 @@ std::vector<double> gaussian(const std::vector<double>& light, int columns, int 
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
       for (int k = std::max(-reach, -c); k <= std::min(reach, columns - 1 - c); ++k) {
-        half[at(c, r)] += weights[static_cast<std::size_t>(k + reach)] * light[at(c + k, r)];
+        const int tap = k + reach;
+        half[at(c, r)] += weights[static_cast<std::size_t>(tap)] * light[at(c + k, r)];
       }
     }
   }
   for (int r = 0; r < rows; ++r) {
     for (int k = std::max(-reach, -r); k <= std::min(reach, rows - 1 - r); ++k) {
-      const double weight = weights[static_cast<std::size_t>(k + reach)];
+      const int tap = k + reach;
+      const double weight = weights[static_cast<std::size_t>(tap)];
       for (int c = 0; c < columns; ++c) all[at(c, r)] += weight * half[at(c, r + k)];
     }
   }
@@ -318,8 +320,10 @@ Image photograph(const WallLight& wall, const Eigen::Vector2d& picture, const Ca
     for (int c = 0; c < camera.columns; ++c) {
       double sum = 0.0;
       for (int k = 0; lit && k < kParts * kParts; ++k) {
-        const Eigen::Vector2d at(c + (k % kParts + 0.5) / kParts - half,
-                                 r + (k / kParts + 0.5) / kParts - 0.5 * camera.rows);
+        const int across = k % kParts;
+        const int down = k / kParts;
+        const Eigen::Vector2d at(c + (across + 0.5) / kParts - half,
+                                 r + (down + 0.5) / kParts - 0.5 * camera.rows);
         sum += light_at(wall, pinhole.wall(at / half)) / (kParts * kParts);
       }
       const Eigen::Vector2d middle((c + 0.5) / half - 1.0, (r + 0.5 - 0.5 * camera.rows) / half);

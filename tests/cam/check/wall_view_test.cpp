@@ -90,7 +90,7 @@ TEST(WallView, DerivativesAreThoseOfDifferences) {
 /// From any side up to 30°, distorted, vignetted, in a lit room.
 TEST(WallView, FindsThePictureFromAnySide) {
   const WallPicture wall = spots();
-  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6, 7, 8}) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
     const Photograph photo = shot(wall, virtual_wall::any_camera(seed));
     const Eigen::VectorXd view = find_picture(photo, wall);
