@@ -26,6 +26,7 @@
 #include "core/text/number_text.h"
 #include "design/design.h"
 #include "design/render.h"
+#include "design/setup/design_options.h"
 #include "design/setup/option_tables.h"
 #include "design/waves/wave_picture.h"
 #include "export/solid/solid_reading.h"
@@ -157,19 +158,19 @@ void put_lamp(const RenderArguments& arguments, CommandFrame& frame, RenderOptio
   put_lamp(light, render.setup);
 }
 
-/// The setup with its picture moved along the light to another z; its size and centre change
-/// evenly from the first screen to the second. The screen is not turned.
-OpticalSetup at_distance(OpticalSetup setup, double z) {
-  if (setup.second) {
-    const OpticalSetup far = on_second_screen(setup);
-    const double share = (z - setup.focal_length) / (far.focal_length - setup.focal_length);
-    setup.image_origin += share * (far.image_origin - setup.image_origin);
-    setup.image_size += share * (far.image_size - setup.image_size);
-    setup.second.reset();
-  }
+/// The setup with its picture moved along the light to another z. Between two screens its size and
+/// centre change evenly from the first to the second. The screen is not turned.
+/// @param height  of the surface, about, mm.
+OpticalSetup at_distance(OpticalSetup setup, double z, double height) {
   setup.screen_x = Eigen::Vector3d::UnitX();
   setup.screen_y = Eigen::Vector3d::UnitY();
+  if (!setup.second) return at_focal_length(setup, z, height);
+  const OpticalSetup far = on_second_screen(setup);
+  const double share = (z - setup.focal_length) / (far.focal_length - setup.focal_length);
+  setup.image_origin += share * (far.image_origin - setup.image_origin);
+  setup.image_size += share * (far.image_size - setup.image_size);
   setup.focal_length = z;
+  setup.second.reset();
   return setup;
 }
 
@@ -181,7 +182,8 @@ void put_distance(const OptionSet& options, double z, Scene& scene) {
       throw InputError(std::string("--at: cannot be given with ") + other + "; leave one out");
     }
   }
-  scene.render.setup = at_distance(scene.render.setup, z);
+  const double height = scene.surface.vertices.row(2).mean();
+  scene.render.setup = at_distance(scene.render.setup, z, height);
   if (!(scene.render.setup.image_size.minCoeff() > 0.0)) {
     throw InputError("--at " + number_text(z) +
                      ": there the picture has no size left between those of the two screens; a z "

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -468,6 +469,8 @@ CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eig
   result.unexplained = std::sqrt(none.square() / none.samples());
   TestedFit best(std::move(none));
   for (int count = 1; count <= kMostSearches; ++count) {
+    control.report(
+        {"check", double{1} * count, 0.0, "looking for causes, search " + std::to_string(count)});
     TestedFit next = search(best, std::min(count, kMostCauses));
     if (next.fit.active() == best.fit.active()) break;
     best = std::move(next);

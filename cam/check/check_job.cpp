@@ -157,10 +157,13 @@ bool is_name_of_check(const std::string& name) {
 }
 
 CheckResult check_photograph(const Lens& lens, const CamOptions& options, const Photograph& photo,
-                             const Executor& executor, const RunControl& control) {
+                             const Executor& own_executor, const RunControl& control) {
+  const Executor executor = own_executor.with_stop(control.stop_token());
   require_light(photo);  // Before the rows are planned, which takes long.
   const WallModel model(lens, options, kFine, executor, control);
+  control.report({"check", 0.0, 0.0, "predicting the picture"});
   const WallPicture forecast = wall_picture(model, Deviations::Zero());
+  control.report({"check", 0.0, 0.0, "finding the picture in the photograph"});
   const Eigen::VectorXd found = find_picture(photo, forecast);
   CheckResult result;
   result.part = model.has_part();

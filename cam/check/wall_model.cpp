@@ -178,12 +178,7 @@ const WallModel::Part& WallModel::part(const Deviations& deviations) const {
   std::vector<BallPath> paths;
   for (const BallRows& rows : rows_) {
     BallPath& path = paths.emplace_back(rows.radius * (1.0 + ball), 0.0);
-    const MoveSink sink = path_sink(path, AxisStretch::of(finish));
-    for (const RasterRow& row : rows.rows) {
-      const PathMove start{MoveKind::kRapid, row.start};
-      sink({&start, 1});
-      sink(row.moves);
-    }
+    for (const RasterRow& row : rows.rows) add_way(row, AxisStretch::of(finish), path);
   }
   // The first is the forecast's, to which fits come back most often.
   if (parts_.size() == kKeptParts) parts_.erase(parts_.begin() + 1);

@@ -289,19 +289,19 @@ int parts_of(const Arc& arc, double share) {
   return std::max(1, static_cast<int>(std::ceil(std::abs(arc.sweep) / longest)));
 }
 
-void add_way(const RasterWay& way, BallPath& path) {
+}  // namespace
+
+void add_way(const RasterWay& way, const AxisStretch& stretch, BallPath& path) {
   Eigen::Vector3d at = way.start;
   for (const PathMove& move : way.moves) {
-    path.add(motion_of(at, move));
+    add_stretched(motion_of(at, move), stretch, path);
     at = move.end;
   }
 }
 
-}  // namespace
-
 void add_row(const RasterRow& row, FinishPaths& paths) {
-  add_way(row.exact, paths.ideal.back());
-  add_way(row.unrounded, paths.fitted.back());
+  add_way(row.exact, {}, paths.ideal.back());
+  add_way(row.unrounded, {}, paths.fitted.back());
 }
 
 AxisStretch AxisStretch::of(const FinishProcess& finish) {

@@ -152,6 +152,9 @@ struct AxisStretch {
 /// ellipses, approximated by arcs within 1e-6 mm.
 void add_stretched(const GcodeMotion& motion, const AxisStretch& stretch, BallPath& path);
 
+/// Adds a way's moves, made by such a machine.
+void add_way(const RasterWay& way, const AxisStretch& stretch, BallPath& path);
+
 /// Adds a row's exact path and that of its moves before rounding to the last of `ideal` and of
 /// `fitted`. @pre the row has traces.
 void add_row(const RasterRow& row, FinishPaths& paths);

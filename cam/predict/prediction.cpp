@@ -357,12 +357,7 @@ std::vector<BallPath> TrialCut::paths_around(const Eigen::AlignedBox2d& box,
   std::vector<BallPath> paths;
   for (const FinishPass& pass : passes_) {
     BallPath& path = paths.emplace_back(pass.tool.radius(), 0.0);
-    const MoveSink sink = path_sink(path, stretch);
-    const auto add = [&](const RasterRow& row) {
-      const PathMove start{MoveKind::kRapid, row.start};
-      sink({&start, 1});
-      sink(row.moves);
-    };
+    const auto add = [&](const RasterRow& row) { add_way(row, stretch, path); };
     const RasterPlan plan = raster_around(pass.plan, box);
     if (!cut_raster(*pass.surface, plan, executor_, add, control).complete) throw Interrupted();
   }

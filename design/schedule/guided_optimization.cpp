@@ -20,25 +20,6 @@
 namespace lensforge {
 namespace {
 
-/// Image motion, in pixels, of the finite difference that measures curvature.
-constexpr double kProbePixels = 0.02;
-
-/// Maximum number of halvings of it if a barrier refuses the step.
-constexpr int kMaxHalvings = 20;
-
-/// Lower bound of the height preconditioner, as a share of the grid Laplacian's lowest eigenvalue:
-/// below it the lens tilts and bends as a whole.
-constexpr double kHeightFloor = 0.5;
-
-/// Brightness is a second derivative of height, so its squared error is a biharmonic form. The
-/// landing point is a first derivative, so its squared error is the Laplacian's form.
-constexpr double kPictureHeightPower = 2.0;
-constexpr double kCorrespondenceHeightPower = 1.0;
-
-/// Smoothing of the x and y steps: shifts longer than two cells are favoured.
-constexpr double kShiftFloor = 0.25;
-constexpr double kShiftPower = 1.0;
-
 /// Powers of the cells' size for a mesh that follows the picture. Objective of a 128² portrait
 /// after 120 iterations, z and x, y: 15300 with 0 and 1, 12600 with 1/2 and 3/2; 20600 with x, y
 /// unscaled.
@@ -56,16 +37,6 @@ constexpr Eigen::Index kMostProbes = 4;
 /// points of a spline may overlap where the spline does not.
 constexpr double kSmallestCell = 1e-3;
 
-double lowest_eigenvalue(const GridShape& shape) {
-  const double longest = std::max(shape.columns, shape.rows) - 1.0;
-  return std::numbers::pi * std::numbers::pi / (longest * longest);
-}
-
-/// A fixed sequence of ±1 that has no preferred frequency (SplitMix64).
-double sign_at(std::uint64_t i) {
-  return (mixed_bits((i + 1) * kGoldenGamma) & 1U) != 0 ? 1.0 : -1.0;
-}
-
 /// Size of the smallest triangle around every vertex, √(area ÷ mean area), at most 1.
 Eigen::VectorXd cell_sizes(const SurfaceMesh& mesh) {
   const Eigen::Index faces = mesh.triangles.cols();
@@ -77,10 +48,6 @@ Eigen::VectorXd cell_sizes(const SurfaceMesh& mesh) {
     for (const int v : mesh.triangles.col(f)) smallest[v] = std::min(smallest[v], areas[f]);
   }
   return (smallest / mean).cwiseMax(kSmallestCell).cwiseSqrt();
-}
-
-double cell_aspect(const OpticalSetup& setup, const GridShape& shape) {
-  return setup.lens_size.y() / (shape.rows - 1) / (setup.lens_size.x() / (shape.columns - 1));
 }
 
 std::unique_ptr<GuidedStage> make_stage(const SurfaceMesh& mesh, const OpticalSetup& setup,

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <numbers>
 
 #include "core/compute/executor.h"
+#include "core/compute/scalar.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
 #include "design/energy/objective.h"
@@ -60,6 +63,43 @@ std::unique_ptr<GuidedStage> make_cuda_stage(const SurfaceMesh& mesh, const Opti
                                              const ObjectiveOptions& options,
                                              const Executor& executor);
 #endif
+
+// How steps are measured.
+
+/// Image motion, in pixels, of the finite difference that measures curvature.
+inline constexpr double kProbePixels = 0.02;
+
+/// Maximum number of halvings of it if a barrier refuses the step.
+inline constexpr int kMaxHalvings = 20;
+
+/// Lower bound of the height preconditioner, as a share of the grid Laplacian's lowest eigenvalue:
+/// below it the lens tilts and bends as a whole.
+inline constexpr double kHeightFloor = 0.5;
+
+/// Brightness is a second derivative of height, so its squared error is a biharmonic form. The
+/// landing point is a first derivative, so its squared error is the Laplacian's form.
+inline constexpr double kPictureHeightPower = 2.0;
+inline constexpr double kCorrespondenceHeightPower = 1.0;
+
+/// Smoothing of the x and y steps: shifts longer than two cells are favoured.
+inline constexpr double kShiftFloor = 0.25;
+inline constexpr double kShiftPower = 1.0;
+
+/// Of a grid's Laplacian, in cells.
+inline double lowest_eigenvalue(const GridShape& shape) {
+  const double longest = std::max(shape.columns, shape.rows) - 1.0;
+  return std::numbers::pi * std::numbers::pi / (longest * longest);
+}
+
+/// A fixed sequence of ±1 that has no preferred frequency (SplitMix64).
+inline double sign_at(std::uint64_t i) {
+  return (mixed_bits((i + 1) * kGoldenGamma) & 1U) != 0 ? 1.0 : -1.0;
+}
+
+/// Cell height ÷ cell width.
+inline double cell_aspect(const OpticalSetup& setup, const GridShape& shape) {
+  return setup.lens_size.y() / (shape.rows - 1) / (setup.lens_size.x() / (shape.columns - 1));
+}
 
 /// Step lengths of the vertices, measured on one surface; see GuidedOptimization::run(). Further
 /// rounds keep them, because a surface that fits already has little curvature to measure. MAE in

@@ -796,8 +796,7 @@ void require_plain_lens(const DesignOptions& o) {
        "--front: --second shapes the front itself; leave out --front"},
       {o.model != SurfaceModel::kSpline, "--model: --second needs --model spline"},
       {o.made_by.has_value(),
-       "--made-by: a process is known of one face only; leave it out with "
-       "--second"},
+       "--made-by: a process is known of one face only; leave it out with --second"},
       {o.light.model != LightModel::kRays, "--light-model: --second follows rays; leave it out"},
       {!source_extent(o.light).none(),
        "--source-angle, --source-size: --second needs light from a point or of one direction; "
@@ -806,8 +805,7 @@ void require_plain_lens(const DesignOptions& o) {
       {!o.light.spectrum.none(), "--wavelengths: --second needs light of one colour; leave it out"},
       {o.light.fresnel, "--fresnel: is not known of two free faces; leave it out with --second"},
       {o.outline.has_value(),
-       "--outline: a lens of two free faces is a rectangle; leave it out "
-       "with --second"}};
+       "--outline: a lens of two free faces is a rectangle; leave it out with --second"}};
   for (const auto& [fault, words] : faults) {
     if (fault) throw InputError(words);
   }
