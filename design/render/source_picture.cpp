@@ -109,7 +109,11 @@ std::vector<double> flux_under_source(const Lens& lens, const OpticalSetup& setu
     return picture_under(setup, count, picture(samples), control);
   }
   const RayPictures rays{picture(std::max(kMeshSamples, samples / 2)), picture(samples)};
-  return picture_under_few_rays(setup, surface_height(lens), count, rays, executor, control);
+  std::vector<double> flux =
+      picture_under_few_rays(setup, surface_height(lens), count, rays, executor, control);
+  // Differences of pictures may leave less than nothing where it is dark.
+  for (double& value : flux) value = std::max(value, 0.0);
+  return flux;
 }
 
 SourceCheck check_source(const Lens& lens, const Executor& executor, const RunControl& control) {
