@@ -97,7 +97,10 @@ std::vector<double> gaussian(const std::vector<double>& light, int columns, int 
   for (double& weight : weights) weight /= sum;
   std::vector<double> half(light.size(), 0.0);
   std::vector<double> all(light.size(), 0.0);
-  const auto at = [&](int c, int r) { return static_cast<std::size_t>(r * columns + c); };
+  const auto at = [&](int c, int r) {
+    const int pixel = r * columns + c;
+    return static_cast<std::size_t>(pixel);
+  };
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
       for (int k = std::max(-reach, -c); k <= std::min(reach, columns - 1 - c); ++k) {
