@@ -226,7 +226,8 @@ OpticalSetup with_image_width(OpticalSetup setup, double width) {
   return setup;
 }
 
-void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup) {
+void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                        const std::string& option) {
   validate(setup);
   const LightPath light(setup);
   double clearance = std::numeric_limits<double>::infinity();
@@ -236,7 +237,7 @@ void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup) {
   if (clearance > 0.0) return;
   // Per mm along z, the screen's distance grows by its normal's z.
   const double steepness = setup.screen_x.cross(setup.screen_y).z();
-  throw InputError("--focal " + number_text(setup.focal_length) +
+  throw InputError(option + " " + number_text(setup.focal_length) +
                    ": the wall must stand above the whole surface, beyond " +
                    number_text(setup.focal_length - clearance / steepness) + " mm");
 }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/compute/executor.h"
@@ -132,8 +133,10 @@ OpticalSetup with_longer_side(OpticalSetup setup, int pixels);
 /// The same setup with an image rectangle of this width, proportions and centre kept.
 OpticalSetup with_image_width(OpticalSetup setup, double width);
 
+/// @param option  names the wall's distance in the message.
 /// @throw InputError unless the wall lies above the whole surface and the setup is valid.
-void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup);
+void require_wall_above(const SurfaceMesh& mesh, const OpticalSetup& setup,
+                        const std::string& option = "--focal");
 
 /// Estimates a rendering of `pixels` pixels, its comparison with a target, and its file.
 WorkEstimate rendering_work(double pixels);

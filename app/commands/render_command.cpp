@@ -220,7 +220,7 @@ Scene adjusted(Scene scene, CommandFrame& frame, RenderArguments& arguments) {
     throw InputError("--background: is for the picture of --target, which is not given");
   }
   if (scene.target) scene.target = resample(*scene.target, setup.pixels.x(), setup.pixels.y());
-  require_wall_above(scene.surface, setup);
+  require_wall_above(scene.surface, setup, arguments.at > 0.0 ? "--at" : "--focal");
   announce_work(work, frame.console());
   return scene;
 }

@@ -69,6 +69,8 @@ TEST_F(TwoFaces, ProjectBothPicturesAsAnIndependentTraceFromTheFrontFinds) {
               metrics["second"]["mae"].get<double>(), 1e-9);
   EXPECT_EQ(read_image(at("again_second.exr")).image,
             read_image(at("lens/render_second.exr")).image);
+  expect_refusal(run({"render", path("lens"), "--at", "2mm"}), 2,
+                 {"--at 2", "above the whole surface"});
   const Outcome between = run({"render", path("lens"), "--at", "60mm", "--json"});
   ASSERT_EQ(between.exit_code, 0) << between.err;
   EXPECT_GT(between.json()["flux_inside"].get<double>(), 0.8);
