@@ -17,7 +17,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/schema/description.h"
-#include "core/text/read_numbers.h"
+#include "core/text/number_text.h"
 #include "core/text/words.h"
 #include "machine/gcode/gcode_dialect.h"
 #include "machine/gcode/program_seal.h"
@@ -27,7 +27,6 @@
 #include "machine/sim/simulated_machine.h"
 #include "machine/stream/controller_dialogue.h"
 #include "machine/stream/journal.h"
-#include "machine/stream/preflight.h"
 #include "machine/stream/program_facts.h"
 
 namespace lensforge {

@@ -28,7 +28,6 @@
 #include "core/schema/description.h"
 #include "core/schema/toml_document.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "machine/gcode.h"
 

@@ -17,7 +17,6 @@
 #include "core/schema/json.h"
 #include "core/schema/option_text.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "design/setup/option_tables.h"
 

@@ -27,7 +27,6 @@
 #include "core/schema/toml.h"
 #include "core/schema/toml_document.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
 #include "design/mpi/session.h"

@@ -14,7 +14,6 @@
 #include "core/io/files.h"
 #include "core/optics/polish_transfer.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 
 namespace lensforge {

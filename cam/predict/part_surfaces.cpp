@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "cam/contact/drop_cutter.h"
-#include "cam/milled/designed_field.h"
+#include "cam/milled/rounded_field.h"
 #include "core/lens/continued_surface.h"
 #include "core/lens/surface_field.h"
 

@@ -16,7 +16,6 @@
 #include "core/image/color.h"
 #include "core/schema/description.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 
 namespace lensforge {

@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 
 namespace lensforge {

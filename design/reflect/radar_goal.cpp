@@ -21,7 +21,6 @@
 #include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "design/optimize/lbfgs.h"
 #include "design/reflect/mesh/faces.h"

@@ -22,7 +22,6 @@
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
 #include "design/reflect/glare.h"

@@ -24,7 +24,6 @@
 #include "core/optics/material.h"
 #include "core/schema/description.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "design/schedule/levels.h"
 #include "design/setup/design_options.h"

@@ -10,7 +10,6 @@
 #include "core/optics/material.h"
 #include "core/optics/optical_setup.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "core/text/words.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"

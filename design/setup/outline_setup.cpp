@@ -15,7 +15,6 @@
 #include "core/image/svg_drawing.h"
 #include "core/io/files.h"
 #include "core/text/number_text.h"
-#include "core/text/read_numbers.h"
 #include "design/setup/design_options.h"
 
 namespace lensforge {

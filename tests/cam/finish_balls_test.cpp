@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "cam/cam_meshes.h"
-#include "cam/milled/designed_field.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
+#include "cam/milled/rounded_field.h"
 #include "cam/milled_paths.h"
 #include "cam/path/finish_raster.h"
 #include "cam/plan/finishing.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/files/height_map.h"
-
 #include <gtest/gtest.h>
 
 #include "core/error.h"

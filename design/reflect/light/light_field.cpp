@@ -11,7 +11,7 @@
 
 #include "core/compute/scalar.h"
 #include "core/error.h"
-#include "core/text/read_numbers.h"
+#include "core/text/number_text.h"
 #include "core/text/words.h"
 #include "design/reflect/glare.h"
 #include "design/reflect/input.h"

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "cam/cam_meshes.h"
-#include "cam/milled/designed_field.h"
 #include "cam/milled/mould.h"
+#include "cam/milled/rounded_field.h"
 #include "cam/milled_tiles.h"
 
 namespace lensforge {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "cam/cam_meshes.h"
-#include "cam/milled/designed_field.h"
+#include "cam/milled/rounded_field.h"
 #include "cam/milled_paths.h"
 #include "cam/milled_tiles.h"
 #include "core/error.h"

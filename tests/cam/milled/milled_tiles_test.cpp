@@ -8,7 +8,6 @@
 
 #include "cam/cam_meshes.h"
 #include "cam/milled/creases.h"
-#include "cam/milled/designed_field.h"
 #include "cam/milled/mould.h"
 #include "cam/milled/rounded_field.h"
 #include "cam/milled_paths.h"

@@ -4,7 +4,7 @@
 
 #include "core/error.h"
 #include "core/temp_folder.h"
-#include "core/text/read_numbers.h"
+#include "core/text/number_text.h"
 
 namespace lensforge {
 namespace {

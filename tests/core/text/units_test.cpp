@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "core/text/read_numbers.h"
+#include "core/text/number_text.h"
 
 namespace lensforge::units_test {
 namespace {

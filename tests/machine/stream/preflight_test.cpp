@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "machine/stream/preflight.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 
 #include "core/temp_folder.h"
 #include "machine/gcode/gcode_reader.h"
+#include "machine/stream/program_facts.h"
 
 namespace lensforge {
 namespace {

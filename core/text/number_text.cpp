@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/text/read_numbers.h"
+
+#include "core/text/number_text.h"
 
 #include <array>
 #include <charconv>
@@ -8,7 +9,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/text/number_text.h"
 #include "core/text/words.h"
 
 namespace lensforge {
