@@ -124,8 +124,9 @@ class EmulatedExecutor {
 
   static constexpr int kThreads = 128;  ///< Per block, as on the GPU.
   /// True if arguments are searched for addresses: the compiler can clear the bytes between
-  /// members, which may hold old ones.
-#if __has_builtin(__builtin_clear_padding)
+  /// members, which may hold old ones, and no address sanitizer has mapped most of what numbers
+  /// look like.
+#if __has_builtin(__builtin_clear_padding) && !defined(__SANITIZE_ADDRESS__)
   static constexpr bool kFindsAddresses = true;
 #else
   static constexpr bool kFindsAddresses = false;
@@ -152,7 +153,7 @@ class EmulatedExecutor {
   template <class Functor>
   static auto words_of(const Functor& functor) {
     std::array<std::uintptr_t, sizeof(Functor) / sizeof(std::uintptr_t)> words{};
-#if __has_builtin(__builtin_clear_padding)
+#if __has_builtin(__builtin_clear_padding) && !defined(__SANITIZE_ADDRESS__)
     Functor copy = functor;
     __builtin_clear_padding(&copy);
     std::memcpy(words.data(), static_cast<const void*>(&copy), sizeof(words));
