@@ -225,7 +225,7 @@ Deviations prior_of(const Deviations& steps) {
 /// predictions are no better. At least 0.8 of what eight photographs of a virtual wall had, rms.
 Deviations model_error(const Deviations& steps) {
   Deviations error;
-  error << 0.0012, 0.003, 0.003, 0.06 * steps[index_of(Deviation::kLampSize)], 0.0012, 0.002, 0.02,
+  error << 0.0012, 0.003, 0.003, 0.03 * steps[index_of(Deviation::kLampSize)], 0.0012, 0.002, 0.02,
       0.02, 0.0001, 0.0015;
   return error;
 }
