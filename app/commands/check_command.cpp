@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,10 +9,12 @@
 #include "app/frame/common_output.h"
 #include "app/frame/option_set.h"
 #include "cam/check/check_job.h"
+#include "cam/check/next_lens.h"
 #include "cam/check/wall_view.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/lens/lens.h"
+#include "core/schema/toml.h"
 #include "core/text/words.h"
 
 namespace lensforge::app {
@@ -26,6 +29,8 @@ struct CheckSettings {
   std::string out;
   std::string dark;
   std::string workshop;
+  std::string workshop_text;
+  std::string fit;
   bool force = false;
   CamOptions cam;
 };
@@ -40,6 +45,9 @@ void describe(Description& d, CheckSettings& settings) {
          "the same view and exposure with the lamp off: the room's light, which is subtracted");
   d.text("--workshop", settings.workshop, "FILE.toml",
          "the workshop that made the part; without it the default one");
+  d.text("--fit", settings.fit, "FILE.toml",
+         "write the workshop with what the photograph tells of it, polish.sigma or "
+         "finish.pitch_error, for design --made-by and cam --workshop");
   d.flag("--force", settings.force, "replace files that lensforge did not write");
 }
 
@@ -78,18 +86,62 @@ std::vector<std::string> warnings_of(const Lens& lens, const CheckResult& result
   return warnings;
 }
 
+/// @throw InputError
+void read_shop(CheckSettings& settings) {
+  if (settings.workshop.empty()) return;
+  settings.workshop_text = read_toml_file(settings.workshop, "a workshop");
+  settings.cam.workshop = parse_workshop(settings.workshop_text, settings.workshop);
+}
+
+/// The folder of --fit, which is looked at before the work. @throw InputError
+std::optional<OutputFolder> place_of_fit(const CheckSettings& settings) {
+  if (settings.fit.empty()) return std::nullopt;
+  require_replaceable("--fit", settings.fit, settings.force);
+  return std::optional<OutputFolder>(std::in_place, fs::absolute(settings.fit).parent_path(),
+                                     FolderLock::Kind::kShared);
+}
+
+/// Writes --fit where there is something to write.
+void write_fit(const CheckSettings& settings, const NextLens& next, std::vector<fs::path>& files,
+               std::vector<std::string>& warnings) {
+  if (settings.fit.empty()) return;
+  if (next.values.empty()) {
+    warnings.push_back("--fit " + settings.fit +
+                       ": not written; the photograph names nothing of a workshop");
+    return;
+  }
+  write_workshop(next, settings.workshop_text, settings.photos.front(), settings.fit);
+  files.emplace_back(settings.fit);
+}
+
+/// What to do now.
+std::vector<std::string> notes_of(const CheckSettings& settings, const NextLens& next) {
+  std::vector<std::string> notes{"look at " +
+                                 (fs::path(settings.out) / check_file::kReport).string()};
+  std::string options = words_of(next.options);
+  if (!settings.fit.empty() && !next.values.empty()) {
+    options = with_word(options, "--made-by ", " ") + shell_word(settings.fit);
+  }
+  if (!options.empty()) notes.push_back("next lens: lensforge design PICTURE " + options);
+  return notes;
+}
+
 CommandResult run(CommandFrame& frame, CheckSettings& settings) {
-  if (!settings.workshop.empty()) settings.cam.workshop = read_workshop(settings.workshop);
+  read_shop(settings);
   const Lens lens = read_lens(settings.source);
   validate(settings.cam, lens.setup);
   frame.begin_folder(settings.out).remove_partial_files(is_name_of_check);
   for (const char* name : kCheckFiles) {
     require_replaceable("--out", fs::path(settings.out) / name, settings.force);
   }
+  const std::optional<OutputFolder> beside = place_of_fit(settings);
   const Photograph photo = read_photos(settings, frame);
   const CheckResult result =
       check_photograph(lens, settings.cam, photo, frame.executor(), frame.control());
-  const std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
+  const NextLens next = next_lens(result.fit, lens, settings.cam);
+  std::vector<std::string> warnings = warnings_of(lens, result);
+  std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
+  write_fit(settings, next, files, warnings);
   nlohmann::json json = check_json(result, lens, settings.cam);
   json["status"] = "done";
   json["options"] = frame.options().used();
@@ -100,11 +152,7 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   }
   text += "  MAE against the target " + fixed(result.to_target.metrics.mae, 4) +
           ", against the forecast " + fixed(result.to_forecast.metrics.mae, 4) + "\n";
-  return {json,
-          text,
-          kDone,
-          warnings_of(lens, result),
-          {"look at " + (fs::path(settings.out) / check_file::kReport).string()}};
+  return {json, text, kDone, warnings, notes_of(settings, next)};
 }
 
 Command<CheckSettings> command() {

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <utility>
 
+#include "cam/check/next_lens.h"
 #include "cam/plan/finishing.h"
 #include "core/image/color.h"
 #include "core/image/image_io.h"
@@ -389,6 +390,19 @@ nlohmann::json all_json(const CheckResult& result, const Lens& lens, const CamOp
   return json;
 }
 
+/// What the next lens should know.
+nlohmann::json next_json(const NextLens& next) {
+  nlohmann::json json = {{"workshop", nlohmann::json::object()},
+                         {"design", nlohmann::json::object()}};
+  for (const FittedValue& value : next.values) {
+    json["workshop"][value.key] = {{"value", value.value}, {"uncertainty", value.uncertainty}};
+  }
+  for (const NextLens::Option& option : next.options) {
+    json["design"][option.name.substr(2)] = option.value;
+  }
+  return json;
+}
+
 }  // namespace
 
 nlohmann::json check_json(const CheckResult& result, const Lens& lens, const CamOptions& options) {
@@ -400,6 +414,7 @@ nlohmann::json check_json(const CheckResult& result, const Lens& lens, const Cam
           {"verdict", verdict_of(result, lens, options)},
           {"causes", causes},
           {"measured", all_json(result, lens, options)},
+          {"next", next_json(next_lens(result.fit, lens, options))},
           {"forecast_of", result.part ? "part" : "design"},
           {"residual", result.fit.residual},
           {"residual_without_causes", result.fit.unexplained},
@@ -463,6 +478,12 @@ std::string report_page(const CheckResult& result, const Lens& lens, const CamOp
     causes += element("p", "",
                       escape_html("Perhaps also: " + words_of(cause, lens, options) +
                                   alternatives_words(cause) + "."));
+  }
+  const NextLens next = next_lens(result.fit, lens, options);
+  if (!next.options.empty()) {
+    causes += element("p", "",
+                      escape_html("A lens for wall and lamp as they are: lensforge design with " +
+                                  words_of(next.options) + "."));
   }
   const std::array<NamedText, 4> facts{{
       {"MAE against the target", likeness_row(result.to_target)},

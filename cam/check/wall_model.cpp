@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cam/leakage/render_field.h"
+#include "cam/milled/creases.h"
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/plan/finishing.h"
@@ -102,27 +103,53 @@ double lamp_angle(const OpticalSetup& setup) {
 
 namespace {
 
-/// Parts and pictures that are kept: a fit comes back to those around it.
-constexpr std::size_t kKeptParts = 3;
-constexpr std::size_t kKeptPictures = 24;
-
-/// Nodes of a part that are kept: 0.5 GB. Larger parts are polished anew for every picture.
+/// Nodes of a part that are kept: 0.5 GB. Larger parts are cut and polished anew for every picture.
 constexpr std::int64_t kMostNodes = 20'000'000;
+
+/// Nodes of all parts that are kept, and as many of cuts; and pixels of all pictures, with as many
+/// of their light: a fit comes back to those around it.
+constexpr std::int64_t kKeptNodes = 20'000'000;
+constexpr std::int64_t kKeptPixels = 30'000'000;
+constexpr std::int64_t kMostKept = 1000;
+
+/// How many of this size are kept.
+std::size_t kept(std::int64_t all, std::int64_t size, std::int64_t least) {
+  return static_cast<std::size_t>(
+      std::clamp(all / std::max<std::int64_t>(size, 1), least, kMostKept));
+}
+
+/// The nodes around a grid on which the widest polish of it depends.
+GridWindow within_polish(GridWindow grid, const PolishModel& polish) {
+  const auto reach = [&](double spacing) {
+    const double nodes = kMostPolish * polish_reach(polish) * polish.sigma / spacing;
+    return static_cast<std::int64_t>(std::ceil(nodes)) + 2 * kCreaseHalo;
+  };
+  const std::int64_t columns = reach(grid.spacing.x());
+  const std::int64_t rows = reach(grid.spacing.y());
+  grid.first_column -= columns;
+  grid.columns += 2 * columns;
+  grid.first_row -= rows;
+  grid.rows += 2 * rows;
+  return grid;
+}
 
 }  // namespace
 
+struct WallModel::Cut {
+  Cut(std::vector<BallPath> paths, double blank_top)
+      : milled(std::move(paths), blank_top), held(milled) {}
+
+  MilledField milled;
+  HeldField held;
+};
+
 struct WallModel::Part {
-  Part(const PolishModel& polish, double ball_share, double pitch_error,
-       std::vector<BallPath> paths, const WallModel& model)
-      : sigma(polish.sigma),
-        ball(ball_share),
-        pitch(pitch_error),
-        milled(std::move(paths), model.blank_top_),
-        polished(milled, {Eigen::Vector2d(0.0, 0.0), model.wide_.lens_size}, polish),
+  Part(std::shared_ptr<const Cut> as_cut, const PolishModel& polish, const WallModel& model)
+      : cut(std::move(as_cut)),
+        polished(cut->held, {Eigen::Vector2d(0.0, 0.0), model.wide_.lens_size}, polish),
         held(polished) {}
 
-  double sigma, ball, pitch;
-  MilledField milled;
+  std::shared_ptr<const Cut> cut;
   PolishedField polished;
   HeldField held;
 };
@@ -139,12 +166,18 @@ WallModel::WallModel(const Lens& lens, const CamOptions& options, int fine,
       height_(mean_height(lens)),
       fault_(tolerance_fault(options, lens.setup)),
       executor_(executor) {
+  const std::int64_t pixels = wide_.pixels.cast<std::int64_t>().prod();
+  lights_.most = kept(kKeptPixels / 2, pixels, 2);
+  pictures_.most = kept(kKeptPixels, pixels, 4);
   if (!fault_.empty()) return;
   if (options.surface.value_or(lens.model) == SurfaceModel::kFacet) {
     fault_ = "draws parts of surfaces without creases only";
     return;
   }
   plan_rows(cut_setup(lens, options), control);
+  grid_ = lens_grid(wide_.lens_size, sample_spacings(options_, lens_.setup, passes_));
+  cuts_.most = kept(kKeptNodes, grid_.size(), 2);
+  parts_.most = kept(kKeptNodes, grid_.size(), 2);
 }
 
 /// The path's decimals are left out: they move light by less than the fit of its moves.
@@ -164,40 +197,46 @@ void WallModel::plan_rows(const CutSetup& setup, const RunControl& control) {
   }
 }
 
-const WallModel::Part& WallModel::part(const Deviations& deviations) const {
+bool WallModel::is_kept_whole() const { return grid_.size() <= kMostNodes; }
+
+std::shared_ptr<const WallModel::Cut> WallModel::cut(double ball, double pitch_error) const {
+  return cuts_.of({ball, pitch_error}, [&] {
+    FinishProcess finish = options_.workshop.process.finish;
+    finish.pitch_error = pitch_error;
+    std::vector<BallPath> paths;
+    for (const BallRows& rows : rows_) {
+      BallPath& path = paths.emplace_back(rows.radius * (1.0 + ball), 0.0);
+      for (const RasterRow& row : rows.rows) add_way(row, AxisStretch::of(finish), path);
+    }
+    auto made = std::make_shared<const Cut>(std::move(paths), blank_top_);
+    // At once as far as any polish of it reaches, so that it is not cut again for a wider one.
+    SurfacePatch patch;
+    if (is_kept_whole()) {
+      made->held.sample(within_polish(grid_, options_.workshop.polish), executor_, patch);
+    }
+    return made;
+  });
+}
+
+std::shared_ptr<const WallModel::Part> WallModel::part(const Deviations& deviations) const {
   PolishModel polish = options_.workshop.polish;
   polish.sigma *= std::exp(deviations[index_of(Deviation::kPolish)]);
-  FinishProcess finish = options_.workshop.process.finish;
-  finish.pitch_error += deviations[index_of(Deviation::kPitch)];
   const double ball = deviations[index_of(Deviation::kBall)];
-  for (const auto& part : parts_) {
-    if (part->sigma == polish.sigma && part->ball == ball && part->pitch == finish.pitch_error) {
-      return *part;
-    }
-  }
-  std::vector<BallPath> paths;
-  for (const BallRows& rows : rows_) {
-    BallPath& path = paths.emplace_back(rows.radius * (1.0 + ball), 0.0);
-    for (const RasterRow& row : rows.rows) add_way(row, AxisStretch::of(finish), path);
-  }
-  // The first is the forecast's, to which fits come back most often.
-  if (parts_.size() == kKeptParts) parts_.erase(parts_.begin() + 1);
-  parts_.push_back(
-      std::make_unique<const Part>(polish, ball, finish.pitch_error, std::move(paths), *this));
-  return *parts_.back();
+  const double pitch_error =
+      options_.workshop.process.finish.pitch_error + deviations[index_of(Deviation::kPitch)];
+  return parts_.of({polish.sigma, ball, pitch_error}, [&] {
+    return std::make_shared<const Part>(cut(ball, pitch_error), polish, *this);
+  });
 }
 
 std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& optics) const {
-  FieldRenderSetup render{
-      optics, lens_grid(optics.lens_size, sample_spacings(options_, lens_.setup, passes_))};
+  FieldRenderSetup render{optics, grid_};
   render.surface_height = height_;
   for (const LightColor& color : light_colors(optics)) {
     const LightPath path(color.setup);
     if (!path.intake_is_plan_area()) render.whole.push_back(intake_of(lens_.surface, path));
   }
-  if (render.grid.size() <= kMostNodes) {
-    render.tile = std::max(render.grid.columns, render.grid.rows);
-  }
+  if (is_kept_whole()) render.tile = std::max(grid_.columns, grid_.rows);
   return render_field(part.held, render, executor_, {}).flux;
 }
 
@@ -254,28 +293,27 @@ Haze WallModel::haze_at(const OpticalSetup& optics, double more) const {
   return haze;
 }
 
-std::vector<double> WallModel::flux(const Deviations& deviations) const {
+std::vector<double> WallModel::clear_flux(const Deviations& deviations) const {
   const OpticalSetup optics = optics_of(deviations);
-  const std::vector<double> light =
-      has_part() ? light_of(part(deviations), optics) : flux_of_lens(lens_, optics, executor_);
-  return hazed(haze_at(optics, deviations[index_of(Deviation::kHaze)]), light, optics.pixels,
-               executor_);
+  return has_part() ? light_of(*part(deviations), optics) : flux_of_lens(lens_, optics, executor_);
 }
 
 Image WallModel::picture(const Deviations& deviations) const {
   const DeviationLimits limits = deviation_limits(lens_.setup);
   const Deviations within = deviations.cwiseMax(limits.least).cwiseMin(limits.most);
-  for (const auto& [at, image] : pictures_) {
-    if (at == within) return image;
-  }
-  const std::vector<double> light = flux(within);
-  const double even = lens_.setup.pixels.cast<double>().prod() * fine_ * fine_;
-  Image image(wide_.pixels.x(), wide_.pixels.y());
-  std::transform(light.begin(), light.end(), image.values().begin(),
-                 [&](double value) { return static_cast<float>(even * std::max(value, 0.0)); });
-  if (pictures_.size() == kKeptPictures) pictures_.erase(pictures_.begin() + 1);
-  pictures_.emplace_back(within, image);
-  return image;
+  return pictures_.of(within, [&] {
+    Deviations clear = within;
+    clear[index_of(Deviation::kHaze)] = 0.0;
+    const OpticalSetup optics = optics_of(within);
+    const std::vector<double> light =
+        hazed(haze_at(optics, within[index_of(Deviation::kHaze)]),
+              lights_.of(clear, [&] { return clear_flux(clear); }), optics.pixels, executor_);
+    const double even = lens_.setup.pixels.cast<double>().prod() * fine_ * fine_;
+    Image image(wide_.pixels.x(), wide_.pixels.y());
+    std::transform(light.begin(), light.end(), image.values().begin(),
+                   [&](double value) { return static_cast<float>(even * std::max(value, 0.0)); });
+    return image;
+  });
 }
 
 }  // namespace lensforge

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <memory>
@@ -16,6 +17,7 @@
 #include "core/compute/executor.h"
 #include "core/image/image.h"
 #include "core/lens/lens.h"
+#include "core/lens/surface_field.h"
 
 namespace lensforge {
 
@@ -61,7 +63,9 @@ std::optional<double> lamp_distance(const OpticalSetup& setup);
 /// surface (MilledField), which is polished (PolishedField) and rendered (render_field(), a lamp
 /// with a width by a convolution). Where parts cannot be drawn (tolerance_fault(), creases) it is
 /// the lens as designed.
-/// Not for several threads at once: the last parts and pictures are kept.
+/// Every step is kept and done anew only for the deviations that it depends on: a cut by ball and
+/// pitch error, a part by these and its polish, its light by these, the lamp and the wall. Not for
+/// several threads at once.
 class WallModel {
  public:
   /// @param lens  must outlive this. @param options  with the workshop.
@@ -95,17 +99,43 @@ class WallModel {
     double radius = 0.0;  ///< mm
     std::vector<RasterRow> rows;
   };
-  /// A part as cut and polished.
+  /// A surface as cut, and one as polished.
+  struct Cut;
   struct Part;
 
+  /// Values by key, of which the one used longest ago is dropped first.
+  template <class Key, class Value>
+  struct Kept {
+    std::size_t most = 1;
+    std::vector<std::pair<Key, Value>> values;  ///< The last one was used last.
+
+    /// The value of a key, made where it is not kept.
+    template <class Make>
+    const Value& of(const Key& key, const Make& make) {
+      const auto found = std::find_if(values.begin(), values.end(),
+                                      [&](const auto& one) { return one.first == key; });
+      if (found != values.end()) {
+        std::rotate(found, found + 1, values.end());
+      } else {
+        Value value = make();
+        if (values.size() == most) values.erase(values.begin());
+        values.emplace_back(key, std::move(value));
+      }
+      return values.back().second;
+    }
+  };
+
   void plan_rows(const CutSetup& setup, const RunControl& control);
-  [[nodiscard]] const Part& part(const Deviations& deviations) const;
+  /// Of a ball, a share, and a pitch error.
+  [[nodiscard]] std::shared_ptr<const Cut> cut(double ball, double pitch_error) const;
+  [[nodiscard]] std::shared_ptr<const Part> part(const Deviations& deviations) const;
   /// Shares of the light of a part.
   [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
   [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
   [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
-  /// Shares of the light, of the lens as designed where there is no part.
-  [[nodiscard]] std::vector<double> flux(const Deviations& deviations) const;
+  /// Shares of the light, of the lens as designed where there is no part, and without haze.
+  [[nodiscard]] std::vector<double> clear_flux(const Deviations& deviations) const;
+  [[nodiscard]] bool is_kept_whole() const;
 
   const Lens& lens_;
   CamOptions options_;
@@ -117,9 +147,12 @@ class WallModel {
   Passes passes_;
   std::string fault_;
   std::vector<BallRows> rows_;  ///< Empty if there is no part.
+  GridWindow grid_;             ///< On which parts are sampled, if there is one.
   Executor executor_;
-  mutable std::vector<std::unique_ptr<const Part>> parts_;
-  mutable std::vector<std::pair<Deviations, Image>> pictures_;
+  mutable Kept<std::array<double, 2>, std::shared_ptr<const Cut>> cuts_;
+  mutable Kept<std::array<double, 3>, std::shared_ptr<const Part>> parts_;
+  mutable Kept<Deviations, std::vector<double>> lights_;
+  mutable Kept<Deviations, Image> pictures_;
 };
 
 }  // namespace lensforge

@@ -433,11 +433,14 @@ void require_agreement(const std::vector<ModelledReading>& readings, const FitQu
       (others.empty() ? "" : ", as far as " + others) + ": measure it again or take it out");
 }
 
-/// Rounds to between a hundredth and a thousandth of its uncertainty, for readable files.
+}  // namespace
+
 double to_digits(double value, double uncertainty) {
   const double digits = std::pow(10.0, 2.0 - std::floor(std::log10(uncertainty)));
   return std::round(value * digits) / digits + 0.0;  // No negative zero.
 }
+
+namespace {
 
 /// @param unit  of the value per unit of the parameter.
 FittedValue value_of(const Solution& solution, Parameter parameter, double unit,
@@ -667,22 +670,16 @@ bool determines_any(const CouponFit& fit) {
   return std::any_of(values.begin(), values.end(), [](const auto* one) { return one->determined; });
 }
 
-std::string sureness(const CouponFit& fit, const FittedValue& value) {
-  return &value == &fit.order ? ", by " + number_text(fit.order_apart, 2) + " standard errors"
-                              : " +- " + number_text(value.uncertainty, 2);
-}
-
-/// Comments that state the fitted values and their source.
-std::string fitted_text(const CouponFit& fit, const std::string& readings) {
-  std::string text =
-      "# Fitted by " + program_mark() + " to " + printable_line(readings, kLongestName) + ":\n";
+/// One line of each value.
+std::vector<std::string> fitted_lines(const CouponFit& fit) {
+  std::vector<std::string> lines;
   for (const FittedValue* value : fit.values()) {
-    text += std::string(kValue) + value->key +
-            (value->determined ? " = " + number_text(value->value) + sureness(fit, *value)
-                               : " is not determined, left as it was") +
-            "\n";
+    lines.push_back(value == &fit.order && value->determined
+                        ? value->key + " = " + number_text(value->value) + ", by " +
+                              number_text(fit.order_apart, 2) + " standard errors"
+                        : fitted_line(*value));
   }
-  return text;
+  return lines;
 }
 
 /// The file without the comments of an earlier fit at its beginning.
@@ -695,6 +692,20 @@ std::string without_fitted(std::string text) {
 }
 
 }  // namespace
+
+std::string fitted_line(const FittedValue& value) {
+  return value.key + (value.determined ? " = " + number_text(value.value) + " +- " +
+                                             number_text(value.uncertainty, 2)
+                                       : " is not determined, left as it was");
+}
+
+std::string fitted_workshop(const std::string& text, const Workshop& fitted,
+                            const std::string& source, const std::vector<std::string>& lines) {
+  std::string file =
+      std::string(kFitted) + program_mark() + " to " + printable_line(source, kLongestName) + ":\n";
+  for (const std::string& line : lines) file += std::string(kValue) + line + "\n";
+  return file + edited_workshop(without_fitted(text), fitted).value_or(workshop_toml(fitted));
+}
 
 CouponFit fit_workshop(const WorkshopFit& task) {
   const std::string name = task.readings.string();
@@ -710,8 +721,7 @@ CouponFit fit_workshop(const WorkshopFit& task) {
   validate(fitted, name + ", the workshop as fitted");
   require_replaceable("--out", task.out, task.force);
   task.before_writing();
-  const auto edited = edited_workshop(without_fitted(task.workshop_text), fitted);
-  write_whole_file(task.out, fitted_text(fit, name) + edited.value_or(workshop_toml(fitted)));
+  write_whole_file(task.out, fitted_workshop(task.workshop_text, fitted, name, fitted_lines(fit)));
   return fit;
 }
 

@@ -123,6 +123,18 @@ CouponFit expected_fit(const CouponReadings& expected, const Workshop& workshop)
 ///         layout is not supported.
 std::optional<std::string> edited_workshop(const std::string& text, const Workshop& to);
 
+/// Rounds to between a hundredth and a thousandth of its uncertainty, for readable files.
+double to_digits(double value, double uncertainty);
+
+/// What the first comments of a fitted workshop's file say of a value.
+std::string fitted_line(const FittedValue& value);
+
+/// A workshop's file as fitted: comments that state to what, with these lines, in place of those of
+/// an earlier fit; the rest by edited_workshop(), else workshop_toml().
+/// @param source  printed on one line, shortened.
+std::string fitted_workshop(const std::string& text, const Workshop& fitted,
+                            const std::string& source, const std::vector<std::string>& lines);
+
 /// Input of fit_workshop().
 struct WorkshopFit {
   std::filesystem::path readings;  ///< A filled-in template.

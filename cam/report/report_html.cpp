@@ -365,15 +365,25 @@ std::string view_link(const ReportData& data) {
                          "to be moved and asked</a>."}));
 }
 
+/// What tells why a part differs from this forecast.
+std::string check_words(const ReportData& data) {
+  if (data.leakage.steps.empty()) return "";
+  const std::string lens = escape_html(data.job);
+  return element("p", "",
+                 joined({"Photograph the wall, then <code>lensforge check ", lens, " PHOTO --out ",
+                         lens, "/check</code> says why the picture differs from this forecast."}));
+}
+
 }  // namespace
 
 std::string report_html(const ReportData& data) {
   namespace section = report_section;
-  const std::string body = joined(
-      {summary(data), section::warnings(data), section::setup(data), section::operations(data),
-       section::polish(data), section::leakage(data), section::tolerances(data),
-       section::light(data), section::maps(data), section::view(data), view_link(data),
-       section::choices(data), section::certificates(data), section::parameters(data)});
+  const std::string body =
+      joined({summary(data), section::warnings(data), section::setup(data),
+              section::operations(data), section::polish(data), section::leakage(data),
+              section::tolerances(data), section::light(data), section::maps(data),
+              section::view(data), view_link(data), check_words(data), section::choices(data),
+              section::certificates(data), section::parameters(data)});
   return html_page({data.job + " – cutting report", section::header(data), body,
                     section::footer(data), std::string(surface_view_script())});
 }

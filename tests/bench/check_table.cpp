@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -142,18 +142,17 @@ class Bench {
       write_image(seen, std::filesystem::path(folder_) / (std::to_string(seed) + ".png"));
     }
     const Photograph photo = photograph(seen, {}, name);
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t start = std::clock();
     const Eigen::VectorXd view = find_picture(photo, wall_picture(model_, Deviations::Zero()));
     const Photograph less =
         shrunk(photo, pixels_across(photo, view) / (1.5 * lens_.setup.pixels.x()));
     CauseFit fit = find_causes(model_, SeenPixels(less, view, 1.2), view, {});
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     std::cerr << name << ", camera " << seed << " (yaw " << number_text(camera.yaw, 2) << ", pitch "
               << number_text(camera.pitch, 2) << ", ambient " << number_text(camera.ambient, 2)
               << ", white " << number_text(camera.white, 3) << "), "
               << number_text(pixels_across(photo, view), 3) << " pixels, rms " << fit.unexplained
-              << " to " << fit.residual << ", " << number_text(seconds, 2) << " s\n";
+              << " to " << fit.residual << ", " << number_text(seconds, 2) << " s of a processor\n";
     for (const FoundCause& f : fit.found) {
       std::cerr << "  found " << name_of(f.deviation) << " (" << index_of(f.deviation) << ") "
                 << f.value << " ± " << f.error << ", evidence " << number_text(f.evidence, 3);

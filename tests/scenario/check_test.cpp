@@ -63,5 +63,12 @@ TEST_F(BadPhotograph, DarkOfSeveralExposures) {
                  {"--dark", "belongs to one exposure"});
 }
 
+/// Before the rows are planned.
+TEST_F(BadPhotograph, FitWouldReplaceAFileOfTheUsers) {
+  photograph("wall.png", 0.1F, 0.6F);
+  write(at("shop.toml"), "# mine\n");
+  expect_refused({path("wall.png"), "--fit", path("shop.toml")}, {"--fit", "shop.toml", "--force"});
+}
+
 }  // namespace
 }  // namespace lensforge::scenario

@@ -68,6 +68,14 @@ Image flipped(const Image& image, bool across, bool down) {
   return result;
 }
 
+Image turned(const Image& image) {
+  Image result(image.rows(), image.columns());
+  for (int r = 0; r < result.rows(); ++r) {
+    for (int c = 0; c < result.columns(); ++c) result.at(c, r) = image.at(r, image.rows() - 1 - c);
+  }
+  return result;
+}
+
 TEST(WallView, DerivativesAreThoseOfDifferences) {
   const WallPicture wall = spots();
   const Photograph photo = shot(wall, virtual_wall::any_camera(5));
@@ -113,6 +121,9 @@ TEST(WallView, RefusesWhatIsNoPhotographOfThePicture) {
   EXPECT_NE(refusal(other, wall).find("is mirrored"), std::string::npos) << refusal(other, wall);
   other.light = flipped(photo.light, true, true);
   EXPECT_NE(refusal(other, wall).find("is upside down"), std::string::npos) << refusal(other, wall);
+  other.light = turned(photo.light);
+  EXPECT_NE(refusal(other, wall).find("is turned by a quarter"), std::string::npos)
+      << refusal(other, wall);
   EXPECT_NE(refusal(shot(spots(3), camera), wall).find("another picture"), std::string::npos);
   other.light = Image(camera.columns, camera.rows, 0.3F);
   EXPECT_NE(refusal(other, wall).find("shows no picture"), std::string::npos);
