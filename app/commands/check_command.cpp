@@ -9,7 +9,6 @@
 #include "app/frame/common_output.h"
 #include "app/frame/option_set.h"
 #include "cam/check/check_job.h"
-#include "cam/check/next_lens.h"
 #include "cam/check/wall_view.h"
 #include "core/error.h"
 #include "core/image/image_io.h"

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cam/check/next_lens.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
+#include "cam/check/check_job.h"
 #include "cam/check/virtual_wall.h"
 #include "core/temp_folder.h"
 
