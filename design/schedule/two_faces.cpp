@@ -287,12 +287,12 @@ struct Fineness {
 
 /// From plane faces; with two rays, a 16² picture's error rises by half when more are looked at.
 constexpr Fineness kFromPlanes{1.0, 3};
-/// From transport, with as many rays per pixel: with one cell the 64² relief and rings start at an
-/// MAE of 0.011 and 0.045, with one and a half at 0.009 and 0.016.
+/// From transport, with as many rays per pixel: with one cell, the second picture starts more than
+/// twice as far from its target.
 constexpr Fineness kFromTransport{1.5, 2};
 
-/// Rays of the transport per pixel side: with one and a half, these pictures start at 0.011 and
-/// 0.025.
+/// Rays of the transport per pixel side: with one and a half, both pictures start farther from
+/// their targets.
 constexpr int kRaysPerPixel = 2;
 
 /// Iterations of a stage, in DesignOptions::iterations: its pictures are small, and it starts
