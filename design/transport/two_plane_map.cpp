@@ -55,8 +55,9 @@ class Transport {
 Eigen::Matrix2Xd even_points(const OpticalSetup& setup, const GridShape& shape) {
   Eigen::Matrix2Xd points(2, Eigen::Index{shape.columns} * shape.rows);
   for (Eigen::Index k = 0; k < points.cols(); ++k) {
-    const Eigen::Array2d cell(static_cast<double>(k % shape.columns) + 0.5,
-                              static_cast<double>(k / shape.columns) + 0.5);
+    const Eigen::Index row = k / shape.columns;
+    const Eigen::Array2d cell(static_cast<double>(k - row * shape.columns) + 0.5,
+                              static_cast<double>(row) + 0.5);
     points.col(k) = setup.image_origin.array() +
                     cell / Eigen::Array2d(shape.columns, shape.rows) * setup.image_size.array();
   }
