@@ -27,6 +27,8 @@
 #include "design/optimize/lbfgs.h"
 #include "design/render.h"
 #include "design/schedule/guided_optimization.h"
+#include "design/schedule/two_face_start.h"
+#include "design/transport/two_plane_map.h"
 
 namespace lensforge {
 namespace {
@@ -277,12 +279,21 @@ constexpr double kCoarsestSide = 16.0;
 /// Steps of the coarsest pictures' contrast.
 constexpr int kContrastSteps = 6;
 
-/// Knot cells of the exit face and samples of the front, per pixel side.
-constexpr double kCellsPerPixel = 1.0;
+/// Knots of both faces.
+struct Fineness {
+  double cells;  ///< Knot cells of the exit face and samples of the front, per pixel side.
+  int samples;   ///< Rays per knot cell each way.
+};
 
-/// Rays per knot cell each way: with two, a 16² picture's error rises by half when more are looked
-/// at.
-constexpr int kSamples = 3;
+/// From plane faces; with two rays, a 16² picture's error rises by half when more are looked at.
+constexpr Fineness kFromPlanes{1.0, 3};
+/// From transport, with as many rays per pixel: with one cell, the second picture starts more than
+/// twice as far from its target.
+constexpr Fineness kFromTransport{1.5, 2};
+
+/// Rays of the transport per pixel side: with one and a half, both pictures start farther from
+/// their targets.
+constexpr int kRaysPerPixel = 2;
 
 /// Iterations of a stage, in DesignOptions::iterations: its pictures are small, and it starts
 /// without transport. Each stage measures its steps anew in this many rounds.
@@ -330,6 +341,7 @@ Eigen::MatrixXd resampling(int from, int to) {
 struct Stage {
   Eigen::Vector2i pixels;
   double contrast;  ///< Share of the targets; the rest is the plane lens's light.
+  Fineness fineness = kFromPlanes;
 };
 
 std::vector<Stage> plan_stages(const Eigen::Vector2i& pixels) {
@@ -356,11 +368,14 @@ struct Shaped {
 
 class TwoFaceDesign {
  public:
-  TwoFaceDesign(const DesignTask& task, const Image& second)
-      : task_(task), second_(second), stages_(plan_stages(task.setup.pixels)) {}
+  TwoFaceDesign(const DesignTask& task, const Image& second) : task_(task), second_(second) {}
 
   TwoFaceResult run() {
     try {
+      if (!begin_with_transport()) {
+        here_ = {};
+        stages_ = plan_stages(task_.setup.pixels);
+      }
       for (index_ = 0; index_ < stages_.size(); ++index_) run_stage(stages_[index_]);
       result_.done = true;
     } catch (const Interrupted&) {
@@ -371,20 +386,47 @@ class TwoFaceDesign {
   }
 
  private:
-  void run_stage(const Stage& stage) {
+  /// Takes the faces that transport finds for the whole pictures; false if barriers refuse them.
+  bool begin_with_transport() {
+    const Stage stage{task_.setup.pixels, 1.0, kFromTransport};
+    stages_ = {stage};
+    task_.control.report({"design, transport of both pictures", 0.0, work(1), ""});
     refine(stage);
+    const std::vector<ScreenGoal> goals = goals_of(stage);
+    const double room = kRoom * task_.options.thickness;
+    const RayBundle bundle = two_plane_map(
+        {goals[0].setup, goals[0].target}, {goals[1].setup, goals[1].target},
+        {kRaysPerPixel * stage.pixels.x(), kRaysPerPixel * stage.pixels.y()},
+        task_.options.thickness + room, task_.executor, RunControl(task_.control.stop_token(), {}));
+    here_.faces = faces_along(bundle, goals[0].setup,
+                              {here_.net, here_.front, task_.options.thickness, room});
+    return !descent_for(stage).errors(here_.faces).empty();
+  }
+
+  /// The optimisation of faces of the present shapes.
+  [[nodiscard]] TwoFaceStage descent_for(const Stage& stage) const {
     const std::vector<ScreenGoal> goals = goals_of(stage);
     ObjectiveOptions options;
     options.weights = task_.options.weights;
     options.model = SurfaceModel::kSpline;
-    options.samples = kSamples;
+    options.samples = stage.fineness.samples;
     options.weights.smooth = 0.0;
     const double cells = (here_.net.columns - 3.0) * (here_.net.rows - 3.0);
     options.area = default_area_barrier(
-        goals.front().setup, static_cast<std::int64_t>(2.0 * kSamples * kSamples * cells));
+        goals.front().setup,
+        static_cast<std::int64_t>(2.0 * options.samples * options.samples * cells));
     const double thickness = task_.options.thickness;
-    TwoFaceStage descent(here_.net, here_.front, goals, options,
-                         {thickness, kLimitWeight, kUnfolded * thickness}, task_.executor);
+    return {here_.net,
+            here_.front,
+            goals,
+            options,
+            {thickness, kLimitWeight, kUnfolded * thickness},
+            task_.executor};
+  }
+
+  void run_stage(const Stage& stage) {
+    refine(stage);
+    TwoFaceStage descent = descent_for(stage);
     flatten_if_refused(descent);
     LbfgsOptions optimizer;
     optimizer.max_iterations = kStageIterations * task_.options.iterations;
@@ -400,7 +442,8 @@ class TwoFaceDesign {
 
   /// Takes the faces to the shapes of a stage; at first they are planes.
   void refine(const Stage& stage) {
-    const Eigen::Vector2d cells = (kCellsPerPixel * stage.pixels.cast<double>()).array().round();
+    const Eigen::Vector2d cells =
+        (stage.fineness.cells * stage.pixels.cast<double>()).array().round();
     const auto columns = static_cast<int>(cells.x());
     const auto rows = static_cast<int>(cells.y());
     const GridShape net{columns + kSplineDegree, rows + kSplineDegree};

@@ -18,12 +18,13 @@ struct TwoFaceResult {
   bool done = false;  ///< False if the control stopped it; the faces are then the best so far.
 };
 
-/// Shapes both faces for the task's picture and `second`, coarse to fine from plane faces.
+/// Shapes both faces for the task's picture and `second`, from the faces that transport finds
+/// (two_plane_map()), or coarse to fine from plane faces where the barriers refuse those.
 ///
-/// The coarsest pictures come out of even light by degrees: their targets are mixed with what the
-/// plane lens projects, less of it from stage to stage, so that the light never has to jump. The
-/// faces of each resolution are refined for the next. At the end the front is at z = 0 or below
-/// and the exit face at the task's thickness or above.
+/// From plane faces, the coarsest pictures come out of even light by degrees: their targets are
+/// mixed with what the plane lens projects, less of it from stage to stage, so that the light never
+/// has to jump. The faces of each resolution are refined for the next. At the end the front is at z
+/// = 0 or below and the exit face at the task's thickness or above.
 /// @pre task.setup.second; second has the size of the task's picture.
 /// @throw InputError if the barriers refuse the lens that the design starts from.
 TwoFaceResult shape_two_faces(const DesignTask& task, const Image& second);
