@@ -28,7 +28,6 @@
 #include "design/render.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/two_face_start.h"
-#include "design/transport/two_plane_map.h"
 
 namespace lensforge {
 namespace {

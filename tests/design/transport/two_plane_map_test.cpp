@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/transport/two_plane_map.h"
-
 #include <gtest/gtest.h>
 
+#include "design/schedule/two_face_start.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
