@@ -179,32 +179,35 @@ std::optional<TriangleMap::Hit> met(const TriangleMap& surface, const Ray& ray) 
   return std::nullopt;
 }
 
-/// Even rays through the front, and the picture of the triangles between them.
+/// Even rays through the front, and the picture of the triangles between them. MAE of a lens of 32²
+/// pixels with 0.0008 by its exit face's points: 0.0034 by 12 rays per pixel each way, 0.0016 by
+/// 24, 0.0011 by 48.
 Traced trace_forward(const TracedLight& light, const Mesh& mesh, const nlohmann::json& lens,
                      const Picture& target) {
-  constexpr int kRaysPerPixel = 12;  // Each way.
+  constexpr int kRaysPerPixel = 48;  // Each way.
   const Vec2 size(lens.at("lens_size").at(0).get<double>(),
                   lens.at("lens_size").at(1).get<double>());
   const TriangleMap surface(mesh, size);
   const int columns = kRaysPerPixel * target.columns;
   const int rows = kRaysPerPixel * target.rows;
-  std::vector<Sample> samples;
-  for (int j = 0; j <= rows; ++j) {
+  const auto row_of_rays = [&](int j) {
+    std::vector<Sample> samples;
     for (int i = 0; i <= columns; ++i) {
       const std::optional<Ray> ray = light.ray_at({size.x() * i / columns, size.y() * j / rows});
       const std::optional<TriangleMap::Hit> hit = ray ? met(surface, *ray) : std::nullopt;
       samples.push_back(hit ? Sample(light, *ray, hit->p, hit->n) : Sample());
     }
-  }
-  Traced traced{ClippedPicture(target.columns, target.rows)};
-  const auto at = [&](int i, int j) -> const Sample& {
-    return samples[static_cast<std::size_t>(j * (columns + 1) + i)];
+    return samples;
   };
+  Traced traced{ClippedPicture(target.columns, target.rows)};
+  std::vector<Sample> low = row_of_rays(0);
   for (int j = 0; j < rows; ++j) {
-    for (int i = 0; i < columns; ++i) {
-      add(light, at(i, j), at(i + 1, j), at(i + 1, j + 1), traced);
-      add(light, at(i, j), at(i + 1, j + 1), at(i, j + 1), traced);
+    std::vector<Sample> high = row_of_rays(j + 1);
+    for (std::size_t i = 0; i + 1 < low.size(); ++i) {
+      add(light, low[i], low[i + 1], high[i + 1], traced);
+      add(light, low[i], high[i + 1], high[i], traced);
     }
+    low.swap(high);
   }
   return traced;
 }
