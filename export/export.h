@@ -96,6 +96,12 @@ struct MeshSolid {
   double volume = 0.0;  ///< mm³
 };
 
+/// Heights that stand for black and white in a grey picture.
+struct GreyScale {
+  double black = 0.0;  ///< mm
+  double white = 0.0;  ///< mm
+};
+
 /// A written height map.
 struct HeightMap {
   GridShape pixels;
@@ -141,12 +147,6 @@ GridShape height_map_shape(const Eigen::Vector2d& size, int longer_side);
 /// @throw Interrupted.
 Image height_map(const OpticalSurface& surface, int longer_side, const Executor& executor,
                  const RunControl& control = {});
-
-/// Heights that stand for black and white in a grey picture.
-struct GreyScale {
-  double black = 0.0;  ///< mm
-  double white = 0.0;  ///< mm
-};
 
 /// Writes a height map as 16-bit grey PNG, linear between the lowest and the highest value, as
 /// laser and relief programs read it; whole or not at all.
