@@ -117,7 +117,7 @@ class TriangleMap {
       }
       for (int j = place(low, 1); j <= place(high, 1); ++j) {
         for (int i = place(low, 0); i <= place(high, 0); ++i) {
-          cells_[static_cast<std::size_t>(j * kSide + i)].push_back(t);
+          cells_[cell(i, j)].push_back(t);
         }
       }
     }
@@ -131,8 +131,7 @@ class TriangleMap {
   [[nodiscard]] std::optional<Hit> above(const Vec2& at) const {
     if (!(at.minCoeff() >= 0.0) || !((size_ - at).minCoeff() >= 0.0)) return std::nullopt;
     constexpr double kEdge = -1e-9;
-    for (const std::size_t t :
-         cells_[static_cast<std::size_t>(place(at, 1) * kSide + place(at, 0))]) {
+    for (const std::size_t t : cells_[cell(place(at, 0), place(at, 1))]) {
       const Vec2 u = corner(t, 1) - corner(t, 0);
       const Vec2 v = corner(t, 2) - corner(t, 0);
       const Vec2 r = at - corner(t, 0);
@@ -156,6 +155,9 @@ class TriangleMap {
   }
   [[nodiscard]] Vec2 corner(std::size_t t, std::size_t k) const {
     return mesh_.points[index(t, k)].head<2>();
+  }
+  static std::size_t cell(int i, int j) {
+    return static_cast<std::size_t>(j) * kSide + static_cast<std::size_t>(i);
   }
   [[nodiscard]] int place(const Vec2& at, int axis) const {
     return std::clamp(static_cast<int>(kSide * at[axis] / size_[axis]), 0, kSide - 1);
