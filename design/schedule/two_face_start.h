@@ -52,8 +52,10 @@ RayBundle two_plane_map(const PlanePicture& first, const PlanePicture& second,
 /// it where there are no points. Its mean height is 0.
 /// @param points, slopes  a column per point; mm, and without unit.
 /// @param cells  knot cells along x and y. @return coefficients, cells + 3 each way, rows along x.
+/// @throw Interrupted
 Eigen::MatrixXd fit_spline_slopes(const Eigen::Matrix2Xd& points, const Eigen::Matrix2Xd& slopes,
-                                  const Eigen::Vector2d& size, const Eigen::Vector2i& cells);
+                                  const Eigen::Vector2d& size, const Eigen::Vector2i& cells,
+                                  const RunControl& control = {});
 
 /// Where the faces of a lens begin: shapes, and the least distances from their limits.
 struct FacePlan {
@@ -65,7 +67,8 @@ struct FacePlan {
 
 /// Faces that send a bundle's light along its rays, by Snell's law as near as splines of these
 /// shapes can.
-/// @param setup  the first screen's.
-LensFaces faces_along(const RayBundle& bundle, const OpticalSetup& setup, const FacePlan& plan);
+/// @param setup  the first screen's. @throw Interrupted
+LensFaces faces_along(const RayBundle& bundle, const OpticalSetup& setup, const FacePlan& plan,
+                      const RunControl& control = {});
 
 }  // namespace lensforge

@@ -393,12 +393,13 @@ class TwoFaceDesign {
     refine(stage);
     const std::vector<ScreenGoal> goals = goals_of(stage);
     const double room = kRoom * task_.options.thickness;
-    const RayBundle bundle = two_plane_map(
-        {goals[0].setup, goals[0].target}, {goals[1].setup, goals[1].target},
-        {kRaysPerPixel * stage.pixels.x(), kRaysPerPixel * stage.pixels.y()},
-        task_.options.thickness + room, task_.executor, RunControl(task_.control.stop_token(), {}));
+    const RunControl silent(task_.control.stop_token(), {});
+    const RayBundle bundle =
+        two_plane_map({goals[0].setup, goals[0].target}, {goals[1].setup, goals[1].target},
+                      {kRaysPerPixel * stage.pixels.x(), kRaysPerPixel * stage.pixels.y()},
+                      task_.options.thickness + room, task_.executor, silent);
     here_.faces = faces_along(bundle, goals[0].setup,
-                              {here_.net, here_.front, task_.options.thickness, room});
+                              {here_.net, here_.front, task_.options.thickness, room}, silent);
     return !descent_for(stage).errors(here_.faces).empty();
   }
 
