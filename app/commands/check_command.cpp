@@ -137,10 +137,9 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   const Photograph photo = read_photos(settings, frame);
   const CheckResult result =
       check_photograph(lens, settings.cam, photo, frame.executor(), frame.control());
-  const NextLens next = next_lens(result.fit, lens, settings.cam);
   std::vector<std::string> warnings = warnings_of(lens, result);
   std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
-  write_fit(settings, next, files, warnings);
+  write_fit(settings, result.next, files, warnings);
   nlohmann::json json = check_json(result, lens, settings.cam);
   json["status"] = "done";
   json["options"] = frame.options().used();
@@ -151,7 +150,7 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   }
   text += "  MAE against the target " + fixed(result.to_target.metrics.mae, 4) +
           ", against the forecast " + fixed(result.to_forecast.metrics.mae, 4) + "\n";
-  return {json, text, kDone, warnings, notes_of(settings, next)};
+  return {json, text, kDone, warnings, notes_of(settings, result.next)};
 }
 
 Command<CheckSettings> command() {

@@ -173,6 +173,7 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options, const 
   const Photograph less =
       shrunk(photo, result.seen_pixels / (kSeenPerPixel * lens.setup.pixels.x()));
   result.fit = find_causes(model, SeenPixels(less, found, kCompared), found, control);
+  result.next = next_lens(result.fit, lens, options);
   result.rectified = rectified(less, result.fit.view, lens.target);
   result.unusable = clipped_share(photo, result.fit.view, lens.target);
   const int margin = forecast.margin;
@@ -414,7 +415,7 @@ nlohmann::json check_json(const CheckResult& result, const Lens& lens, const Cam
           {"verdict", verdict_of(result, lens, options)},
           {"causes", causes},
           {"measured", all_json(result, lens, options)},
-          {"next", next_json(next_lens(result.fit, lens, options))},
+          {"next", next_json(result.next)},
           {"forecast_of", result.part ? "part" : "design"},
           {"residual", result.fit.residual},
           {"residual_without_causes", result.fit.unexplained},
@@ -479,11 +480,10 @@ std::string report_page(const CheckResult& result, const Lens& lens, const CamOp
                       escape_html("Perhaps also: " + words_of(cause, lens, options) +
                                   alternatives_words(cause) + "."));
   }
-  const NextLens next = next_lens(result.fit, lens, options);
-  if (!next.options.empty()) {
+  if (!result.next.options.empty()) {
     causes += element("p", "",
                       escape_html("A lens for wall and lamp as they are: lensforge design with " +
-                                  words_of(next.options) + "."));
+                                  words_of(result.next.options) + "."));
   }
   const std::array<NamedText, 4> facts{{
       {"MAE against the target", likeness_row(result.to_target)},

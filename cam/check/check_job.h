@@ -42,12 +42,28 @@ struct Likeness {
   double blur = 0.0;     ///< Standard deviation of that, pixels.
 };
 
+/// What the design of the next lens should know of a photograph's causes. A cause that the
+/// photograph cannot tell from another is left out, and haze: dust, glare and a camera's tone curve
+/// look like a rough surface.
+struct NextLens {
+  /// An option of `design` with its value, as they are typed.
+  struct Option {
+    std::string name;
+    std::string value;
+  };
+
+  Workshop workshop;                ///< With what was learnt of it.
+  std::vector<FittedValue> values;  ///< That were learnt, by the workshop file's keys.
+  std::vector<Option> options;      ///< For the wall and the lamp as they are.
+};
+
 /// What a photograph shows of a lens, its pictures with the lens's pixels, linear light.
 struct CheckResult {
   Image rectified;  ///< Without the room's light and the camera's falloff, as bright as the target.
   Image forecast;
   Likeness to_target, to_forecast;
   CauseFit fit;
+  NextLens next;             ///< By `fit`.
   bool part = false;         ///< The forecast is the part's; else the design's.
   std::string fault;         ///< Why it is not.
   double seen_pixels = 0.0;  ///< Of the photograph, across the picture.
@@ -71,21 +87,6 @@ nlohmann::json check_json(const CheckResult& result, const Lens& lens, const Cam
 std::vector<std::filesystem::path> write_check(const CheckResult& result, const Lens& lens,
                                                const CamOptions& options,
                                                const std::filesystem::path& folder);
-
-/// What the design of the next lens should know of a photograph's causes. A cause that the
-/// photograph cannot tell from another is left out, and haze: dust, glare and a camera's tone curve
-/// look like a rough surface.
-struct NextLens {
-  /// An option of `design` with its value, as they are typed.
-  struct Option {
-    std::string name;
-    std::string value;
-  };
-
-  Workshop workshop;                ///< With what was learnt of it.
-  std::vector<FittedValue> values;  ///< That were learnt, by the workshop file's keys.
-  std::vector<Option> options;      ///< For the wall and the lamp as they are.
-};
 
 /// @param options  with the workshop that made the part.
 NextLens next_lens(const CauseFit& fit, const Lens& lens, const CamOptions& options);

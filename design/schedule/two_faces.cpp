@@ -385,7 +385,9 @@ class TwoFaceDesign {
   }
 
  private:
-  /// Takes the faces that transport finds for the whole pictures; false if barriers refuse them.
+  /// Takes the faces that transport finds for the whole pictures; false if it does not
+  /// converge or
+  /// barriers refuse them.
   bool begin_with_transport() {
     const Stage stage{task_.setup.pixels, 1.0, kFromTransport};
     stages_ = {stage};
@@ -398,6 +400,7 @@ class TwoFaceDesign {
         two_plane_map({goals[0].setup, goals[0].target}, {goals[1].setup, goals[1].target},
                       {kRaysPerPixel * stage.pixels.x(), kRaysPerPixel * stage.pixels.y()},
                       task_.options.thickness + room, task_.executor, silent);
+    if (!bundle.converged) return false;
     here_.faces = faces_along(bundle, goals[0].setup,
                               {here_.net, here_.front, task_.options.thickness, room}, silent);
     return !descent_for(stage).errors(here_.faces).empty();
