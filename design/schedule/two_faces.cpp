@@ -385,8 +385,7 @@ class TwoFaceDesign {
   }
 
  private:
-  /// Takes the faces that transport finds for the whole pictures; false if it does not
-  /// converge or
+  /// Takes the faces that transport finds for the whole pictures; false if it does not converge or
   /// barriers refuse them.
   bool begin_with_transport() {
     const Stage stage{task_.setup.pixels, 1.0, kFromTransport};
