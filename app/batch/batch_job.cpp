@@ -28,7 +28,7 @@
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
 #include "core/schema/json.h"
-#include "core/schema/option_text.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 

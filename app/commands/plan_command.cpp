@@ -15,7 +15,7 @@
 #include "core/optics/picture_blur.h"
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
-#include "core/schema/option_text.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 #include "design/setup/option_tables.h"

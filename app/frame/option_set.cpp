@@ -23,7 +23,7 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/schema/json.h"
-#include "core/schema/option_text.h"
+#include "core/schema/description.h"
 #include "core/schema/toml.h"
 #include "core/schema/toml_document.h"
 #include "core/text/number_text.h"

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/image/color.h"
 #include "core/image/image_io.h"
-#include "core/schema/option_text.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
 
 namespace lensforge::python {

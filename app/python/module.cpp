@@ -11,7 +11,7 @@
 #include "app/frame/command_line.h"
 #include "app/python/bindings.h"
 #include "core/error.h"
-#include "core/schema/option_text.h"
+#include "core/schema/description.h"
 #include "core/text/version.h"
 
 namespace lensforge::python {

@@ -19,7 +19,7 @@
 #include "core/optics/material.h"
 #include "core/optics/picture_blur.h"
 #include "core/schema/json.h"
-#include "core/schema/option_text.h"
+#include "core/schema/description.h"
 #include "core/text/words.h"
 #include "design/schedule/levels.h"
 

@@ -22,7 +22,6 @@
 #include "design/energy/smoothness.h"
 #include "design/flux/flux_image.h"
 #include "design/mpi/ranks.h"
-#include "design/optimize/cosine_transform.h"
 #include "design/optimize/grid_preconditioner.h"
 #include "design/optimize/lbfgs.h"
 

@@ -16,7 +16,7 @@
 #include "core/optics/light_path.h"
 #include "design/flux/flux_image.h"
 #include "design/flux/flux_triangle.h"
-#include "design/optimize/cosine_transform.h"
+#include "design/optimize/grid_preconditioner.h"
 
 namespace lensforge {
 namespace {

@@ -16,7 +16,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/schema/json.h"
-#include "core/schema/option_text.h"
+#include "core/schema/description.h"
 #include "core/schema/toml.h"
 #include "design/reflect/input.h"
 #include "design/setup/option_tables.h"

@@ -20,7 +20,7 @@
 
 #include "core/compute/executor.h"
 #include "core/error.h"
-#include "design/optimize/cosine_transform.h"
+#include "design/optimize/grid_preconditioner.h"
 
 /// A GPU without a GPU: the kernels, buffers and orders of summation of a CudaExecutor, run by the
 /// calling thread. Its memory can be touched by kernels and copies alone: anything else that reads

@@ -11,7 +11,6 @@
 
 #include "core/error.h"
 #include "core/schema/json.h"
-#include "core/schema/option_text.h"
 #include "core/schema/toml.h"
 #include "core/temp_folder.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optimize/cosine_transform.h"
+#include "design/optimize/grid_preconditioner.h"
 
 #include <gtest/gtest.h>
 
