@@ -27,15 +27,15 @@
 #include "core/error.h"
 #include "core/io/files.h"
 #include "core/io/lens_folder.h"
-#include "core/schema/json.h"
 #include "core/schema/description.h"
+#include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
 
 namespace lensforge::app {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20U;
 constexpr std::size_t kMaxName = 200;
@@ -101,13 +101,13 @@ const FieldSpecs& specs_of(const std::string& command) {
   return known.at(command);
 }
 
-std::string word_of(const json& value) {
+std::string word_of(const Json& value) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
 /// @throw InputError unless the option can have this value.
-void require_value(const FieldSpec& spec, const json& value) {
-  const auto is_word = [](const json& v) { return v.is_string() || v.is_number(); };
+void require_value(const FieldSpec& spec, const Json& value) {
+  const auto is_word = [](const Json& v) { return v.is_string() || v.is_number(); };
   const bool flag = spec.kind == FieldKind::kFlag;
   const bool list = value.is_array() && spec.kind == FieldKind::kText;
   const bool fits = flag   ? value.is_boolean()
@@ -125,7 +125,7 @@ void require_value(const FieldSpec& spec, const json& value) {
 /// Reads one line.
 class JobLine {
  public:
-  JobLine(const json& line, const std::string& where) : fields_(line, where), where_(where) {
+  JobLine(const Json& line, const std::string& where) : fields_(line, where), where_(where) {
     for (const auto& [key, value] : line.items()) {
       if (key != "name" && key != "command" && key != "target" && key != "options" &&
           key != "then") {
@@ -153,21 +153,21 @@ class JobLine {
     throw InputError(where_ + ": " + what + ": " + rule);
   }
 
-  static json options_of(const JsonFields& fields) {
-    if (!fields.has("options")) return json::object();
-    const json& options = fields.at("options");
+  static Json options_of(const JsonFields& fields) {
+    if (!fields.has("options")) return Json::object();
+    const Json& options = fields.at("options");
     if (!options.is_object()) fields.refuse("options", "an object of option names and values");
     return options;
   }
 
-  void add_further(const json& then, BatchJob& job) const {
+  void add_further(const Json& then, BatchJob& job) const {
     if (!then.is_array()) fields_.refuse("then", "a list of commands");
     if (!then.empty() && job.steps.front().command != "design") {
       refuse("then", "only a design can be followed by other commands");
     }
-    for (const json& next : then) {
+    for (const Json& next : then) {
       if (next.is_string()) {
-        job.steps.push_back(step(next.get<std::string>(), json::object(), false));
+        job.steps.push_back(step(next.get<std::string>(), Json::object(), false));
       } else {
         const JsonFields fields(next, where_, "then.");
         job.steps.push_back(step(fields.text("command"), options_of(fields), false));
@@ -175,18 +175,18 @@ class JobLine {
     }
   }
 
-  [[nodiscard]] BatchStep step(const std::string& name, const json& options, bool first) const {
+  [[nodiscard]] BatchStep step(const std::string& name, const Json& options, bool first) const {
     const JobCommand* command = command_named(name);
     if (command == nullptr || command->first != first) {
-      refuse("command " + json(name).dump(),
+      refuse("command " + Json(name).dump(),
              first ? "design or reflect" : "cam, export or render after a design");
     }
-    BatchStep step{name, json::object()};
+    BatchStep step{name, Json::object()};
     for (const auto& [key, value] : options.items()) set(step, key, value);
     return step;
   }
 
-  void set(BatchStep& step, const std::string& key, const json& value) const {
+  void set(BatchStep& step, const std::string& key, const Json& value) const {
     try {
       step.set(key, value);
     } catch (const InputError& e) {
@@ -204,7 +204,7 @@ bool BatchStep::has_option(const std::string& name) const {
   return specs_of(command).contains(name);
 }
 
-void BatchStep::set(const std::string& name, const json& value) {
+void BatchStep::set(const std::string& name, const Json& value) {
   const auto refuse = [&](const std::string& rule) {
     throw InputError("option '" + name + "' of " + command + ": " + rule);
   };
@@ -225,19 +225,19 @@ void BatchStep::set(const std::string& name, const json& value) {
 Arguments BatchStep::words() const {
   Arguments words;
   for (const auto& [key, value] : options.items()) {
-    if (value == json(false)) continue;
+    if (value == Json(false)) continue;
     words.push_back("--" + key);
     if (value.is_boolean()) continue;
     if (!value.is_array()) {
       words.push_back(word_of(value));
       continue;
     }
-    for (const json& part : value) words.push_back(word_of(part));
+    for (const Json& part : value) words.push_back(word_of(part));
   }
   return words;
 }
 
-json BatchJob::json() const {
+nlohmann::json BatchJob::json() const {
   nlohmann::json all = nlohmann::json::array();
   for (const BatchStep& step : steps) {
     all.push_back({{"command", step.command}, {"options", step.options}});
@@ -267,7 +267,7 @@ std::vector<BatchJob> read_jobs(const std::filesystem::path& path) {
     ++number;
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
     const std::string where = path.string() + " line " + std::to_string(number);
-    const json parsed = parse_json(line, where);
+    const Json parsed = parse_json(line, where);
     jobs.push_back(JobLine(parsed, where).job());
   }
   if (jobs.empty()) throw InputError(path.string() + ": holds no job, one JSON object a line");
@@ -396,16 +396,16 @@ std::string content_of(const fs::path& file) {
 }
 
 /// job.json in the job's folder or in that of its work; null if there is none.
-json record_in(const fs::path& folder) {
-  json record = json_in(folder / kJobFile);
-  return record.is_object() && record.value("format", "") == kFormat ? record : json();
+Json record_in(const fs::path& folder) {
+  Json record = json_in(folder / kJobFile);
+  return record.is_object() && record.value("format", "") == kFormat ? record : Json();
 }
 
-bool is_of(const json& record, const BatchJob& job) {
-  return record.is_object() && record.value("job", json()) == job.json();
+bool is_of(const Json& record, const BatchJob& job) {
+  return record.is_object() && record.value("job", Json()) == job.json();
 }
 
-JobOutcome outcome_of(const json& record, bool earlier) {
+JobOutcome outcome_of(const Json& record, bool earlier) {
   const bool missed = record["status"] == "limit";
   return {missed ? Status::kLimitMissed : Status::kDone, record["message"], earlier,
           record["seconds"]};
@@ -424,7 +424,7 @@ class JobWork {
 
   JobOutcome run() {
     // Another batch may have done it in the meantime.
-    const json done = record_in(place_.out / job_.name);
+    const Json done = record_in(place_.out / job_.name);
     if (is_of(done, job_)) {
       clear();
       return outcome_of(done, true);
@@ -447,7 +447,7 @@ class JobWork {
     fs::remove_all(lens_);
     fs::remove(folder_ / kJobLog);
     record_ = {{"format", kFormat},         {"version", 1},
-               {"job", job_.json()},        {"steps", json::array()},
+               {"job", job_.json()},        {"steps", Json::array()},
                {"program", program_mark()}, {"seconds", 0.0}};
     set_status("open", "");
     save();
@@ -532,7 +532,7 @@ class JobWork {
   /// The rename is what makes the job done.
   JobOutcome publish() {
     set_status("done", "");
-    for (const json& step : record_["steps"]) {
+    for (const Json& step : record_["steps"]) {
       if (step["exit_code"] != kLimitMissed) continue;
       set_status("limit",
                  step["command"].get<std::string>() + ": " + step["message"].get<std::string>());
@@ -558,7 +558,7 @@ class JobWork {
   fs::path folder_;
   fs::path lens_;
   FolderLock lock_;
-  json record_;
+  Json record_;
 };
 
 }  // namespace
@@ -581,9 +581,9 @@ std::string status_word(JobOutcome::Status status) {
   return "open";
 }
 
-json job_record(const BatchJob& job, const fs::path& out) {
+Json job_record(const BatchJob& job, const fs::path& out) {
   for (const fs::path& folder : {out / job.name, out / kWork / job.name}) {
-    json record = record_in(folder);
+    Json record = record_in(folder);
     if (is_of(record, job)) return record;
   }
   return {};
@@ -593,7 +593,7 @@ void require_room_for(const BatchJob& job, const BatchPlace& place) {
   const fs::path folder = place.out / job.name;
   std::error_code ignored;
   if (!fs::exists(folder, ignored)) return;
-  const json record = record_in(folder);
+  const Json record = record_in(folder);
   if (record.is_null()) {
     throw InputError(folder.string() + ": is there and is no job's; give job \"" + job.name +
                      "\" of " + place.jobs_file + " another name");
@@ -671,12 +671,12 @@ class Table {
   std::vector<Cells> rows_;
 };
 
-std::string cell_of(const json& value) {
+std::string cell_of(const Json& value) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
 /// Every value within objects; lists are no single values and are left out.
-void add_values(const std::string& prefix, const json& value, Table& table, Table::Cells& row) {
+void add_values(const std::string& prefix, const Json& value, Table& table, Table::Cells& row) {
   if (value.is_object()) {
     for (const auto& [key, inner] : value.items()) {
       const bool repeats = key == "options" || key == "command" || key == "out";
@@ -687,16 +687,16 @@ void add_values(const std::string& prefix, const json& value, Table& table, Tabl
   }
 }
 
-void add_options(const json& steps, Table& table, Table::Cells& row) {
-  for (const json& step : steps) {
+void add_options(const Json& steps, Table& table, Table::Cells& row) {
+  for (const Json& step : steps) {
     for (const auto& [key, value] : step["options"].items()) {
       table.add(row, step["command"].get<std::string>() + "." + key, cell_of(value));
     }
   }
 }
 
-void add_results(const json& steps, Table& table, Table::Cells& row) {
-  for (const json& step : steps) add_values(step["command"], step["result"], table, row);
+void add_results(const Json& steps, Table& table, Table::Cells& row) {
+  for (const Json& step : steps) add_values(step["command"], step["result"], table, row);
 }
 
 }  // namespace

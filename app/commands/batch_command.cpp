@@ -181,7 +181,7 @@ std::string result_text(const BatchSettings& settings, const std::vector<BatchJo
   return text;
 }
 
-int exit_code(const BatchRun& run, const std::stop_token& stop) {
+int batch_exit_code(const BatchRun& run, const std::stop_token& stop) {
   if (stop.stop_requested()) return kInterrupted;
   if (run.count(Status::kFailed) + run.count(Status::kBusy) > 0) return kFailed;
   return run.count(Status::kLimitMissed) > 0 ? kLimitMissed : kDone;
@@ -205,25 +205,25 @@ CommandResult run(CommandFrame& frame, BatchSettings& settings) {
   batch.run(settings.parallel, frame.stop_token());
   if (!settings.table.empty()) write_whole_file(settings.table, table_of(jobs, batch, place));
   CommandResult result{result_json(settings, jobs, batch), result_text(settings, jobs, batch),
-                       exit_code(batch, frame.stop_token())};
+                       batch_exit_code(batch, frame.stop_token())};
   if (result.exit_code == kInterrupted) {
     result.notes.emplace_back("interrupted; the same command does what is open");
   }
   return result;
 }
 
-Command<BatchSettings> command() {
+Command<BatchSettings> batch_verb() {
   return {"batch", "Does the jobs of a file, each in a folder of its own.", run};
 }
 
 }  // namespace
 
-int batch_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int batch_command(const Arguments& arguments) { return run_command(batch_verb(), arguments); }
 
 CommandCall batch_call(const Arguments& program) {
   BatchSettings settings;
   settings.program = program;
-  return call_of(command(), settings);
+  return call_of(batch_verb(), settings);
 }
 
 }  // namespace lensforge::app

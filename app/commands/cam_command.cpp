@@ -445,7 +445,7 @@ CommandResult run(CommandFrame& frame, NestSettings& settings) {
   return outcome;
 }
 
-Command<NestSettings> command() {
+Command<NestSettings> nest_verb() {
   return {
       "nest",
       "Makes programs that mill several lenses of one blank with one zero, and predicts what each "
@@ -455,8 +455,8 @@ Command<NestSettings> command() {
 
 }  // namespace
 
-int nest_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int nest_command(const Arguments& arguments) { return run_command(nest_verb(), arguments); }
 
-CommandCall nest_call() { return call_of(command(), NestSettings()); }
+CommandCall nest_call() { return call_of(nest_verb(), NestSettings()); }
 
 }  // namespace lensforge::app

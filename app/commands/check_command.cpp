@@ -153,15 +153,15 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   return {json, text, kDone, warnings, notes_of(settings, result.next)};
 }
 
-Command<CheckSettings> command() {
+Command<CheckSettings> check_verb() {
   return {"check", "Finds a lens's picture in a photograph of the wall and says what went wrong.",
           run};
 }
 
 }  // namespace
 
-int check_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int check_command(const Arguments& arguments) { return run_command(check_verb(), arguments); }
 
-CommandCall check_call() { return call_of(command(), CheckSettings()); }
+CommandCall check_call() { return call_of(check_verb(), CheckSettings()); }
 
 }  // namespace lensforge::app

@@ -158,15 +158,15 @@ CommandResult run(CommandFrame& frame, CouponSettings& settings) {
   return settings.fit.empty() ? make(frame, settings) : fit(frame, settings);
 }
 
-Command<CouponSettings> command() {
+Command<CouponSettings> coupon_verb() {
   return {"coupon", "Makes a test piece that calibrates a workshop, or fits the workshop to it.",
           run};
 }
 
 }  // namespace
 
-int coupon_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int coupon_command(const Arguments& arguments) { return run_command(coupon_verb(), arguments); }
 
-CommandCall coupon_call() { return call_of(command(), CouponSettings()); }
+CommandCall coupon_call() { return call_of(coupon_verb(), CouponSettings()); }
 
 }  // namespace lensforge::app

@@ -413,14 +413,14 @@ CommandResult run(CommandFrame& frame, InfoSettings& settings) {
   return *described;
 }
 
-Command<InfoSettings> command() {
+Command<InfoSettings> info_verb() {
   return {"info", "Says what a lens folder, solid, mesh, picture or G-code program is.", run};
 }
 
 }  // namespace
 
-int info_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int info_command(const Arguments& arguments) { return run_command(info_verb(), arguments); }
 
-CommandCall info_call() { return call_of(command(), InfoSettings()); }
+CommandCall info_call() { return call_of(info_verb(), InfoSettings()); }
 
 }  // namespace lensforge::app

@@ -14,8 +14,8 @@
 #include "core/image/image_io.h"
 #include "core/optics/picture_blur.h"
 #include "core/page/html_page.h"
-#include "core/schema/json.h"
 #include "core/schema/description.h"
+#include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
 #include "design/setup/option_tables.h"
@@ -274,7 +274,7 @@ CommandResult run(CommandFrame& frame, PlanSettings& settings) {
   return result;
 }
 
-Command<PlanSettings> command() {
+Command<PlanSettings> plan_verb() {
   return {"plan",
           "Proposes sizes for a lens from what is known of picture, lamp, wall and workshop, and "
           "says what to expect of each.",
@@ -283,8 +283,8 @@ Command<PlanSettings> command() {
 
 }  // namespace
 
-int plan_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int plan_command(const Arguments& arguments) { return run_command(plan_verb(), arguments); }
 
-CommandCall plan_call() { return call_of(command(), PlanSettings()); }
+CommandCall plan_call() { return call_of(plan_verb(), PlanSettings()); }
 
 }  // namespace lensforge::app

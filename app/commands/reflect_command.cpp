@@ -260,14 +260,14 @@ CommandResult run(CommandFrame& frame, ReflectSettings& settings) {
   return settings.evaluate ? evaluate(frame, settings) : shape(frame, settings);
 }
 
-Command<ReflectSettings> command() {
+Command<ReflectSettings> reflect_verb() {
   return {"reflect", "Deforms a mesh so that it reflects light as wanted.", run};
 }
 
 }  // namespace
 
-int reflect_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int reflect_command(const Arguments& arguments) { return run_command(reflect_verb(), arguments); }
 
-CommandCall reflect_call() { return call_of(command(), ReflectSettings()); }
+CommandCall reflect_call() { return call_of(reflect_verb(), ReflectSettings()); }
 
 }  // namespace lensforge::app

@@ -350,7 +350,7 @@ SendSummary watched_job(const OptionSet& options, const SendSettings& settings,
   }
 }
 
-int exit_code(const SendSummary& summary) {
+int send_exit_code(const SendSummary& summary) {
   if (summary.result && summary.result->status == SendStatus::kInterrupted) return kInterrupted;
   if (summary.result && !summary.result->done()) return kFailed;
   return summary.facts.time.stream_limited() ? kLimitMissed : kDone;
@@ -359,7 +359,7 @@ int exit_code(const SendSummary& summary) {
 CommandResult report(const OptionSet& options, const SendSettings& settings,
                      const SendSummary& summary) {
   CommandResult outcome{send_json(options, summary), send_text(settings, summary),
-                        exit_code(summary), summary.findings.warnings};
+                        send_exit_code(summary), summary.findings.warnings};
   if (summary.result && !summary.result->done()) {
     outcome.notes.push_back(summary.result->reason + "; " +
                             settings.job.journal_of(settings.file).string() +

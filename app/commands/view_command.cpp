@@ -98,14 +98,14 @@ CommandResult run(CommandFrame& frame, ViewSettings& settings) {
           std::move(warnings)};
 }
 
-Command<ViewSettings> command() {
+Command<ViewSettings> view_verb() {
   return {"view", "Writes a page that draws a lens's light and lets one change it.", run};
 }
 
 }  // namespace
 
-int view_command(const Arguments& arguments) { return run_command(command(), arguments); }
+int view_command(const Arguments& arguments) { return run_command(view_verb(), arguments); }
 
-CommandCall view_call() { return call_of(command(), ViewSettings()); }
+CommandCall view_call() { return call_of(view_verb(), ViewSettings()); }
 
 }  // namespace lensforge::app

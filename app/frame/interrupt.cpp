@@ -23,10 +23,10 @@ namespace {
 constexpr std::array kSignals = {SIGINT, SIGTERM, SIGHUP};
 
 // A handler reaches nothing but globals.
-volatile std::sig_atomic_t json_at_signals = 0;        // NOLINT: see above
-volatile std::sig_atomic_t interrupted = 0;            // NOLINT: see above
-sem_t wake;                                            // NOLINT: see above
-std::array<struct sigaction, kSignals.size()> before;  // NOLINT: see above
+volatile std::sig_atomic_t json_at_signals = 0;                 // NOLINT: see above
+volatile std::sig_atomic_t interrupted = 0;                     // NOLINT: see above
+sem_t wake;                                                     // NOLINT: see above
+std::array<struct sigaction, kSignals.size()> handlers_before;  // NOLINT: see above
 
 void wake_waiter(int /*signal*/) {
   interrupted = 1;
@@ -66,14 +66,15 @@ void ignore_signals() noexcept { handle_with(SIG_IGN); }
 InterruptWatch::InterruptWatch(SecondInterrupt second, std::function<void()> overdue)
     : second_(second), overdue_(std::move(overdue)) {
   sem_init(&wake, 0, 0);
-  before = handle_with(wake_waiter);
+  handlers_before = handle_with(wake_waiter);
   // A signal that came at the end of an earlier watch, whose token was no longer checked.
   if (interrupted != 0) stop_.request_stop();
   waiter_ = std::thread([this] { wait_for_signals(); });
 }
 
 InterruptWatch::~InterruptWatch() {
-  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before[i], nullptr);
+  for (std::size_t i = 0; i < kSignals.size(); ++i)
+    sigaction(kSignals[i], &handlers_before[i], nullptr);
   finished_ = true;
   sem_post(&wake);
   waiter_.join();

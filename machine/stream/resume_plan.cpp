@@ -23,7 +23,7 @@ constexpr double kSameHeight = 1e-4;
 /// Builds the lines one after another, in the program's unit and work coordinates.
 class EntryWriter {
  public:
-  EntryWriter(const Entry& entry, std::int64_t line, std::int64_t offset)
+  EntryWriter(const PathEntry& entry, std::int64_t line, std::int64_t offset)
       : entry_(entry), inches_(entry.state.inches.value_or(false)), line_(line), offset_(offset) {}
 
   std::deque<OutgoingLine> write() {
@@ -129,7 +129,7 @@ class EntryWriter {
     if (state.inverse_time) add("G93");
   }
 
-  const Entry& entry_;
+  const PathEntry& entry_;
   bool inches_;
   std::int64_t line_;
   std::int64_t offset_;
@@ -183,11 +183,12 @@ std::string point_text(const Eigen::Vector3d& point) {
       .append(trimmed_decimal(point.z(), 3));
 }
 
-std::deque<OutgoingLine> entry_lines(const Entry& entry, std::int64_t line, std::int64_t offset) {
+std::deque<OutgoingLine> entry_lines(const PathEntry& entry, std::int64_t line,
+                                     std::int64_t offset) {
   return EntryWriter(entry, line, offset).write();
 }
 
-std::vector<std::string> entry_steps(const Entry& entry) {
+std::vector<std::string> entry_steps(const PathEntry& entry) {
   const EntryWriter writer(entry, 0, 0);
   const Eigen::Vector3d first = writer.targets().front();
   const SpindleOrder order = spindle_order(entry.state);
@@ -316,7 +317,7 @@ void require_same_place(const JournalRecord& record, const ControllerInfo& info)
 }
 
 /// The entry must begin below the tool's current height: nothing is known about the space above.
-void require_below_retract(const Entry& entry) {
+void require_below_retract(const PathEntry& entry) {
   if (entry.path.empty()) return;
   const double retract = entry.info.start.position.z();
   for (const Eigen::Vector3d& at :
@@ -350,7 +351,7 @@ ResumePlan plan_resume(std::istream& program, const JournalRecord& record,
     plan.steps = {"nothing was certainly carried out: the program runs from its first line"};
     return plan;
   }
-  const Entry entry{path, history.state, info, facts, options};
+  const PathEntry entry{path, history.state, info, facts, options};
   require_below_retract(entry);
   plan.before = entry_lines(entry, plan.line - 1, plan.offset);
   plan.steps = entry_steps(entry);

@@ -48,7 +48,7 @@ ResumePlan plan_resume(std::istream& program, const JournalRecord& record,
                        const ResumeOptions& options);
 
 /// Input for a safe re-entry into a program.
-struct Entry {
+struct PathEntry {
   const std::vector<GcodeMotion>&
       path;                 ///< Path of the descent; empty: straight down to the tool's place.
   const GcodeState& state;  ///< State at the re-entry, with the tool's place.
@@ -60,10 +60,11 @@ struct Entry {
 /// Returns the lines that bring a homed machine to the entry: modes, up, spindle, coolant, over,
 /// down, along, modes of the program. In the program's unit. @param line, offset  position in the
 /// program that they are assigned to.
-std::deque<OutgoingLine> entry_lines(const Entry& entry, std::int64_t line, std::int64_t offset);
+std::deque<OutgoingLine> entry_lines(const PathEntry& entry, std::int64_t line,
+                                     std::int64_t offset);
 
 /// entry_lines() in plain sentences.
-std::vector<std::string> entry_steps(const Entry& entry);
+std::vector<std::string> entry_steps(const PathEntry& entry);
 
 /// Points above the path; their height above it falls to zero, with zero slope at the path's end.
 /// Machine coordinates, mm. The first is the bottom of the plunge, the last the path's end.
