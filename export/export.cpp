@@ -19,7 +19,7 @@
 #include "core/text/version.h"
 #include "core/text/words.h"
 #include "design/render.h"
-#include "design/render/wanted_picture.h"
+#include "design/render/source_picture.h"
 #include "export/files/closed_solid.h"
 #include "export/files/mesh_formats.h"
 #include "export/solid/solid_files.h"

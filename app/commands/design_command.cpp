@@ -52,7 +52,6 @@
 #include "design/mpi/session.h"
 #include "design/schedule/levels.h"
 #include "design/setup/design_options.h"
-#include "design/setup/option_tables.h"
 
 namespace lensforge::app {
 namespace {

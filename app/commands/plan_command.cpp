@@ -18,7 +18,7 @@
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
 #include "core/text/words.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge::app {
 namespace {

@@ -27,7 +27,6 @@
 #include "design/design.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"
-#include "design/setup/option_tables.h"
 #include "design/waves/wave_picture.h"
 #include "export/solid/solid_reading.h"
 

@@ -14,7 +14,6 @@
 #include "core/io/lens_folder.h"
 #include "core/text/words.h"
 #include "design/setup/design_options.h"
-#include "design/setup/option_tables.h"
 
 namespace lensforge::app {
 namespace {

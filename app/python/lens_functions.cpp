@@ -28,7 +28,7 @@
 #include "core/page/drawings.h"
 #include "design/design.h"
 #include "design/render.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 
 /// A lens, and the commands as functions.
 namespace lensforge::python {

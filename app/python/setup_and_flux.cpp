@@ -22,7 +22,6 @@
 #include "core/schema/json.h"
 #include "design/render.h"
 #include "design/setup/design_options.h"
-#include "design/setup/option_tables.h"
 
 namespace lensforge::python {
 namespace {

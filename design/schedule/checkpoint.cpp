@@ -18,7 +18,7 @@
 #include "core/schema/json.h"
 #include "core/spline/control_net.h"
 #include "core/text/words.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 
 // After the header come the vertices and, if the header has scales, the reach of their steps, as
 // doubles.

@@ -7,7 +7,7 @@
 #include "app/commands/settings.h"
 #include "cam/plan/cam_options.h"
 #include "core/temp_folder.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 
 namespace lensforge::app {
 namespace {

@@ -19,7 +19,7 @@
 #include "core/schema/description.h"
 #include "core/schema/toml.h"
 #include "design/reflect/input.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 #include "export/export.h"
 #include "machine/send.h"
 

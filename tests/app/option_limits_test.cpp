@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/text/number_text.h"
 #include "design/reflect/input.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 #include "export/export.h"
 #include "machine/send.h"
 

@@ -17,7 +17,7 @@
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 #include "design/ray_tracer.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 #include "design/test_setups.h"
 
 namespace lensforge::render_test {

@@ -9,7 +9,7 @@
 #include "core/spline/control_net.h"
 #include "design/design.h"
 #include "design/render.h"
-#include "design/render/wanted_picture.h"
+#include "design/render/source_picture.h"
 #include "export/files/closed_solid.h"
 #include "export/sample_surfaces.h"
 #include "export/spline/spline_fit.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/render/wanted_picture.h"
+#include "design/render/source_picture.h"
 
 #include <gtest/gtest.h>
 

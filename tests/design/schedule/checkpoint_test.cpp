@@ -16,7 +16,7 @@
 #include "core/member_count.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/temp_folder.h"
-#include "design/setup/option_tables.h"
+#include "design/setup/design_options.h"
 #include "design/test_setups.h"
 
 namespace lensforge {

@@ -8,7 +8,6 @@
 #include "core/optics/material.h"
 #include "core/schema/description.h"
 #include "design/setup/design_options.h"
-#include "design/setup/option_tables.h"
 
 namespace lensforge {
 namespace {
