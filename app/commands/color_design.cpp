@@ -82,16 +82,55 @@ ColorTarget read_color_target(CommandFrame& frame, const DesignSettings& setting
   return target;
 }
 
-/// Takes the middle lens's options to those of a lens beside it and its lamp.
+/// Distance between the lenses' middles, mm.
+double pitch_of(const DesignSettings& settings) {
+  return settings.design.width + settings.color.gap;
+}
+
+double middle_of_picture(const OpticalSetup& setup) { return setup.screen_centre().x(); }
+
+/// Takes the middle lens's options to those of a lens beside it and its lamp. A point source moves
+/// outwards, so that the straight way from it through the lens leads to the common picture;
+/// parallel light stays as it is, and the lens becomes a wedge.
 /// @param place  of the lens, in lenses from the middle to the right.
-void move_to_lamp(DesignSettings& settings, double wavelength, int place) {
+void move_to_lamp(DesignSettings& settings, const Eigen::Vector2i& pixels, double wavelength,
+                  int place) {
   DesignOptions& design = settings.design;
-  design.light.image_offset.x() -= place * (design.width + settings.color.gap);
-  if (traits(design.light.body).transmits) {
-    design.light.spectrum.wavelengths = {wavelength};
-  } else {
-    design.light.wavelength_nm = wavelength;
+  LightOptions& light = design.light;
+  const double aside = place * pitch_of(settings);
+  const OpticalSetup middle = optical_setup(design, pixels);
+  if (place != 0 && light.source == SourceKind::kPoint) {
+    Eigen::Vector3d at = place_of_source(light, middle.lens_size).value();
+    at.x() += aside * std::abs(at.z()) / design.focal_length;
+    light.source_distance = 0.0;
+    light.source_position = at;
   }
+  light.image_offset.x() +=
+      middle_of_picture(middle) - aside - middle_of_picture(optical_setup(design, pixels));
+  if (traits(light.body).transmits) {
+    light.spectrum.wavelengths = {wavelength};
+  } else {
+    light.wavelength_nm = wavelength;
+  }
+}
+
+/// Slope of the outer lenses in parallel light, to first order. @pre the lamps are parallel.
+double wedge_of(const DesignSettings& settings) {
+  const DesignOptions& design = settings.design;
+  const double bends = traits(design.light.body).transmits ? design.ior - 1.0 : 2.0;
+  return pitch_of(settings) / ((design.focal_length - design.thickness) * bends);
+}
+
+/// Notes that the outer lenses are steep, and what makes them flatter.
+void note_wedge(const DesignSettings& settings, const Console& console) {
+  constexpr double kSteep = 0.3;  // A picture's own slopes come on top; at 0.5 balls cut badly.
+  if (settings.design.light.source == SourceKind::kPoint) return;
+  const double slope = wedge_of(settings);
+  if (slope < kSteep) return;
+  console.note(joined({"in parallel light the outer lenses are wedges with a slope of ",
+                       fixed(slope, 2), ", hard to cut; a wall at --focal ",
+                       number_text(std::ceil(settings.design.focal_length * slope / kSteep)),
+                       "mm or lamps nearby, --source point, make them flatter"}));
 }
 
 /// What the three lenses project together.
@@ -142,7 +181,7 @@ struct Registration {
 Registration registration_of(const DesignSettings& settings, const Lens& lens) {
   const double pixel = lens.setup.image_size.x() / lens.setup.pixels.x();
   const double beyond = settings.design.focal_length - settings.design.thickness;
-  return {0.01 * (settings.design.width + settings.color.gap) / pixel, 1e-3 * beyond / pixel};
+  return {0.01 * pitch_of(settings) / pixel, 1e-3 * beyond / pixel};
 }
 
 nlohmann::json color_json(const DesignSettings& settings, const ColorTarget& target,
@@ -155,7 +194,7 @@ nlohmann::json color_json(const DesignSettings& settings, const ColorTarget& tar
     const double place = static_cast<double>(k) - 1.0;
     lamps.push_back({{"lens", kLampNames[k]},
                      {"wavelength_nm", settings.color.lamps[k]},
-                     {"x_mm", place * (settings.design.width + settings.color.gap)},
+                     {"x_mm", place * pitch_of(settings)},
                      {"share_of_watts", watts[k]},
                      {"share_of_lumens", lumens[k]},
                      {"metrics", metrics_json(lenses[k])}});
@@ -249,7 +288,9 @@ CommandResult run_three_lamps(CommandFrame& frame, DesignSettings& settings) {
     frame.begin_file();
     settle(frame.options(), settings, one.image, frame.control());
     settings.out = (out / kLampNames[k]).string();
-    move_to_lamp(settings, settings.color.lamps[k], static_cast<int>(k) - 1);
+    move_to_lamp(settings, {target.rgb[k].columns(), target.rgb[k].rows()}, settings.color.lamps[k],
+                 static_cast<int>(k) - 1);
+    if (k == 0) note_wedge(settings, frame.console());
     frame.console().note(
         joined({kLampNames[k], " lamp, ", number_text(settings.color.lamps[k]), " nm"}));
     CommandResult result = design_for(frame, settings, one, earlier[k]);

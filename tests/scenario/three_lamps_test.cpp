@@ -90,6 +90,25 @@ TEST_F(ThreeLamps, AddUpToAPictureInColour) {
   EXPECT_THAT(again.out, HasSubstr("in colour  mean difference"));
 }
 
+TEST_F(ThreeLamps, NearbyStandAslantSoThatNoLensIsAWedge) {
+  const Outcome made = run(
+      hues({"--out", path("near"), "--source", "point", "--source-distance", "200mm", "--json"}));
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const nlohmann::json result = made.json();
+  EXPECT_LT(result["delta_e"]["mean"].get<double>(), 1.0);
+  for (const nlohmann::json& lamp : result["lamps"]) {
+    const std::string folder = "near/" + lamp["lens"].get<std::string>();
+    const nlohmann::json lens = nlohmann::json::parse(content(at(folder + "/lens.json")));
+    const double x = lamp["x_mm"].get<double>();
+    // Up to how colours shift in the plate below the surface.
+    EXPECT_NEAR(lens["image_origin"][0].get<double>() + x, 0.0, 0.005);
+    // The lamp is on the line through the lens's middle and the picture's.
+    EXPECT_NEAR(lens["source"]["position"][0].get<double>(), 6.0 + x * 200.0 / 80.0, 1e-9);
+    const nlohmann::json about = run({"info", at(folder), "--json"}).json();
+    EXPECT_LT(about["z"][1].get<double>() - about["z"][0].get<double>(), 1.0) << about;
+  }
+}
+
 TEST_F(ThreeLamps, WhatTheyCannotHaveIsRefusedInOneLine) {
   const std::pair<Arguments, std::vector<std::string>> faults[] = {
       {{"--lamps", "625,525"}, {"--lamps 625,525", "3 finite numbers"}},
