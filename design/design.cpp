@@ -238,10 +238,25 @@ DesignResult::Wall wall_of(const Lens& lens, const std::optional<MadeBy>& proces
   return wall;
 }
 
+namespace {
+
+/// Light of a single wavelength as that of one index, which transport goes by, too.
+DesignOptions in_one_index(DesignOptions options) {
+  Spectrum& spectrum = options.light.spectrum;
+  if (spectrum.wavelengths.size() != 1) return options;
+  options.light.wavelength_nm = spectrum.wavelengths[0];
+  options.ior = Dispersion{options.ior, spectrum.abbe}.index_at(spectrum.wavelengths[0]);
+  spectrum.wavelengths.clear();
+  spectrum.powers.clear();
+  return options;
+}
+
+}  // namespace
+
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control) {
   validate(options, target);
-  const DesignOptions settled = with_smoothness_applied(options);
+  const DesignOptions settled = with_smoothness_applied(in_one_index(options));
   const DesignTask task = make_task(target, settled, executor, control);
   if (settled.second.picture) return design_two_faces(task, executor);
   Checkpoint state = first_state(task);
@@ -252,13 +267,15 @@ DesignResult design_lens(const Image& target, const DesignOptions& options,
   if (done) result.message = "all levels done" + log.remark();
   result.fingerprint = state.fingerprint;
   result.convergence = std::move(state.convergence);
+  result.lens.setup.ior = options.ior;
+  result.lens.setup.spectrum = options.light.spectrum;
   // Rounds that stopped early leave work over.
   if (done) log.report_done();
   return result;
 }
 
 std::uint64_t design_identity(const Image& target, const DesignOptions& options) {
-  return design_fingerprint(working_picture(target, options, {}), options);
+  return design_fingerprint(working_picture(target, options, {}), in_one_index(options));
 }
 
 namespace {

@@ -383,7 +383,7 @@ constexpr const char* kWork = ".work";
 constexpr const char* kLens = "out";  ///< In a job's work folder: what gets its name.
 constexpr const char* kOld = "old";   ///< The replaced folder.
 constexpr const char* kStepOutput = "step.json";
-constexpr const char* kFormat = "lensforge.job";
+constexpr const char* kJobFormat = "lensforge.job";
 
 /// A command that was interrupted with its batch ends within a second and then lets go of the
 /// folder.
@@ -398,7 +398,7 @@ std::string content_of(const fs::path& file) {
 /// job.json in the job's folder or in that of its work; null if there is none.
 Json record_in(const fs::path& folder) {
   Json record = json_in(folder / kJobFile);
-  return record.is_object() && record.value("format", "") == kFormat ? record : Json();
+  return record.is_object() && record.value("format", "") == kJobFormat ? record : Json();
 }
 
 bool is_of(const Json& record, const BatchJob& job) {
@@ -446,7 +446,7 @@ class JobWork {
     if (is_of(record_, job_)) return;
     fs::remove_all(lens_);
     fs::remove(folder_ / kJobLog);
-    record_ = {{"format", kFormat},         {"version", 1},
+    record_ = {{"format", kJobFormat},      {"version", 1},
                {"job", job_.json()},        {"steps", Json::array()},
                {"program", program_mark()}, {"seconds", 0.0}};
     set_status("open", "");
@@ -589,7 +589,7 @@ Json job_record(const BatchJob& job, const fs::path& out) {
   return {};
 }
 
-void require_room_for(const BatchJob& job, const BatchPlace& place) {
+void require_room_for_job(const BatchJob& job, const BatchPlace& place) {
   const fs::path folder = place.out / job.name;
   std::error_code ignored;
   if (!fs::exists(folder, ignored)) return;

@@ -106,7 +106,7 @@ nlohmann::json job_record(const BatchJob& job, const std::filesystem::path& out)
 
 /// @throw InputError if the job's folder exists and belongs to another job (unless `place.force`)
 ///        or was not written by batch.
-void require_room_for(const BatchJob& job, const BatchPlace& place);
+void require_room_for_job(const BatchJob& job, const BatchPlace& place);
 
 /// Runs a job in `.work/NAME` and renames the folder when the job is done: a folder NAME is always
 /// complete. Finished commands are not repeated; an interrupted design continues from its

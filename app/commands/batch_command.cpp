@@ -194,7 +194,7 @@ CommandResult run(CommandFrame& frame, BatchSettings& settings) {
   const int threads = std::max(1, frame.options().executor().concurrency() / settings.parallel);
   const BatchPlace place{settings.out, settings.jobs_file, threads, settings.force,
                          settings.program};
-  for (const BatchJob& job : jobs) require_room_for(job, place);
+  for (const BatchJob& job : jobs) require_room_for_job(job, place);
   if (!settings.table.empty()) {
     require_replaceable("--table", settings.table, settings.force || is_job_table(settings.table));
   }

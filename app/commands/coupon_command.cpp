@@ -65,7 +65,7 @@ nlohmann::json values_json(const CouponFit& fit) {
   return json;
 }
 
-std::string value_text(const FittedValue& value) {
+std::string fitted_text(const FittedValue& value) {
   const std::string number = number_text(value.value, 5);
   return "  " + value.key + std::string(20 - value.key.size(), ' ') +
          (value.determined ? number + " ± " + number_text(value.uncertainty, 2)
@@ -86,7 +86,7 @@ std::string order_text(const CouponFit& fit) {
 std::string values_text(const CouponFit& fit) {
   std::string text;
   for (const FittedValue* value : fit.values()) {
-    text += value == &fit.order ? order_text(fit) : value_text(*value);
+    text += value == &fit.order ? order_text(fit) : fitted_text(*value);
   }
   return text;
 }
@@ -113,7 +113,7 @@ CommandResult fit(CommandFrame& frame, const CouponSettings& settings) {
   std::string text = settings.out + ": the workshop as fitted\n" + values_text(result);
   if (result.touch_off.determined) {
     json["touch_off_mm"] = value_json(result.touch_off);
-    text += value_text(result.touch_off);
+    text += fitted_text(result.touch_off);
   }
   for (const FittedReading& reading : result.readings) {
     json["readings"].push_back({{"key", reading.key},

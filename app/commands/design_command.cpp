@@ -2,6 +2,7 @@
 #include "app/commands/design_command.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
@@ -44,6 +45,7 @@
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
 #include "core/spline/control_net.h"
+#include "core/text/number_text.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
 #include "design/design.h"
@@ -103,6 +105,23 @@ void require_wide_drawing(const Image& drawing, const DesignSettings& settings) 
                 : ": draw it less narrow"));
 }
 
+void describe(Description& d, ColorOptions& color) {
+  constexpr const char* kLamps = "--lamps";
+  d.word("--color", color.way, {{"grey", ColorWay::kGrey}, {"three-lamps", ColorWay::kThreeLamps}},
+         "project the picture's brightness, or its colours by three lenses side by side, each "
+         "with a lamp of its own, whose pictures add up at one place");
+  d.text(
+      {.name = kLamps,
+       .help = "wavelengths of the three lamps, nm: red, green, blue",
+       .unit = "R,G,B"},
+      [&color] { return numbers_text(color.lamps); },
+      [&color](const std::string& text) {
+        std::ranges::copy(parse_numbers(text, kLamps, 3), color.lamps.begin());
+      });
+  d.length("--lamp-gap", color.gap, Limits::between(0.0, kMaxLensWidth),
+           "between the three lenses of --color three-lamps");
+}
+
 }  // namespace
 
 void describe(Description& d, DesignSettings& settings) {
@@ -117,6 +136,7 @@ void describe(Description& d, DesignSettings& settings) {
          "in a picture, seen from the cutter's side")
       .essential = true;
   describe(d, settings.background);
+  describe(d, settings.color);
   describe(d, settings.design.weights);
   d.text("--made-by", settings.made_by, "default|FILE.toml",
          "shape the part that this workshop cuts and polishes, not the surface alone")
@@ -659,12 +679,11 @@ void note_begin(const DesignSettings& settings, const LoadedImage& loaded,
   }
 }
 
-CommandResult run(CommandFrame& frame, DesignSettings& settings) {
+}  // namespace
+
+CommandResult design_for(CommandFrame& frame, DesignSettings& settings, const LoadedImage& loaded,
+                         const EarlierDesign& earlier) {
   const Console& console = frame.console();
-  const EarlierDesign earlier = EarlierDesign::in(settings.out);
-  if (!settings.live.empty()) loopback_port("--live", settings.live);
-  refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
-  const LoadedImage loaded = read_pictures(frame, settings);
   DesignOptions& design = settings.design;
   refuse_splines_on_ranks(design);
   if (settings.resume && earlier.lens && !earlier.checkpoint) {
@@ -692,6 +711,17 @@ CommandResult run(CommandFrame& frame, DesignSettings& settings) {
     note_begin(settings, loaded, device, console);
   });
   return finish(frame, device, settings, settings.out, result);
+}
+
+namespace {
+
+CommandResult run(CommandFrame& frame, DesignSettings& settings) {
+  if (settings.color.way == ColorWay::kThreeLamps) return run_three_lamps(frame, settings);
+  const EarlierDesign earlier = EarlierDesign::in(settings.out);
+  if (!settings.live.empty()) loopback_port("--live", settings.live);
+  refuse_to_overwrite(settings.out, earlier, settings.resume, settings.force);
+  const LoadedImage loaded = read_pictures(frame, settings);
+  return design_for(frame, settings, loaded, earlier);
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "app/frame/command_run.h"
 #include "app/frame/console.h"
 #include "app/frame/option_set.h"
 #include "cam/plan/cam_options.h"
@@ -16,6 +18,16 @@
 
 namespace lensforge::app {
 
+/// How a coloured picture is projected: as grey, or by three lenses with a lamp each.
+enum class ColorWay { kGrey, kThreeLamps };
+
+/// Options of a picture in colour.
+struct ColorOptions {
+  ColorWay way = ColorWay::kGrey;
+  std::array<double, 3> lamps{625.0, 525.0, 465.0};  ///< Wavelengths, nm: red, green, blue.
+  double gap = 10.0;                                 ///< Between the lenses, mm.
+};
+
 /// Options of `lensforge design`.
 struct DesignSettings {
   std::string target;
@@ -25,6 +37,7 @@ struct DesignSettings {
   std::string made_by;    ///< Workshop file, or "default"; empty: not designed for a process.
   bool robust = false;    ///< Design for parts polished less or more than made_by states.
   CamOptions cut;  ///< For made_by: whether the part or a mould is milled, and the shrinkage.
+  ColorOptions color;
   DesignOptions design;
   std::vector<std::string> changes;  ///< Changes made to the pictures above, in words.
   std::string live;  ///< Port of a page that shows the design while it runs; empty: none.
@@ -74,5 +87,15 @@ nlohmann::json design_provenance(const OptionSet& options, const ChosenDevice& d
 /// @throw RunError if something cannot be written.
 void write_design(const std::filesystem::path& folder, const DesignResult& result,
                   const Console& console);
+
+/// Designs the lens for a picture that was read, and writes it to settings.out.
+/// @param earlier  what that folder held before the picture was read.
+/// @pre settle() @throw InputError, RunError, Interrupted.
+CommandResult design_for(CommandFrame& frame, DesignSettings& settings, const LoadedImage& loaded,
+                         const EarlierDesign& earlier);
+
+/// Designs the three lenses of --color three-lamps into folders of settings.out, and writes the
+/// picture that they project together beside them.
+CommandResult run_three_lamps(CommandFrame& frame, DesignSettings& settings);
 
 }  // namespace lensforge::app

@@ -65,7 +65,7 @@ struct SplitLine {
   std::string comment;  ///< Text of the comments.
 };
 
-SplitLine split(const std::string& line) {
+SplitLine split_line(const std::string& line) {
   SplitLine parts;
   bool in_brackets = false;
   for (std::size_t i = 0; i < line.size(); ++i) {
@@ -122,7 +122,7 @@ GcodeSummary summarise_gcode(const fs::path& path) {
                        (zero ? "holds a zero byte"
                              : "is longer than " + std::to_string(kLongestLine) + " characters"));
     }
-    const SplitLine parts = split(line);
+    const SplitLine parts = split_line(line);
     in_header = in_header && (parts.code.empty() || parts.code == "%");
     if (in_header && !parts.comment.empty() && summary.header.size() < kMaxHeaderLines) {
       summary.header.push_back(parts.comment);
@@ -136,8 +136,8 @@ GcodeSummary summarise_gcode(const fs::path& path) {
   return summary;
 }
 
-/// Description of a file.
-struct Description : CommandResult {
+/// What is printed of a file.
+struct InfoResult : CommandResult {
   /// Names and values may come from the file.
   void line(const std::string& foreign_name, const std::string& value) {
     const std::string name = printable_line(foreign_name, 60);
@@ -147,7 +147,7 @@ struct Description : CommandResult {
 };
 
 /// @param unit  after a space, or empty.
-void describe_extent(Description& d, const Eigen::AlignedBox3d& box, const std::string& unit) {
+void describe_extent(InfoResult& d, const Eigen::AlignedBox3d& box, const std::string& unit) {
   for (int k = 0; k < 3; ++k) {
     if (!(box.min()[k] <= box.max()[k])) continue;
     const std::string axis(1, "xyz"[k]);
@@ -156,7 +156,7 @@ void describe_extent(Description& d, const Eigen::AlignedBox3d& box, const std::
   }
 }
 
-void describe_mesh(Description& d, const SurfaceMesh& mesh) {
+void describe_mesh(InfoResult& d, const SurfaceMesh& mesh) {
   d.line("mesh", std::to_string(mesh.vertex_count()) + " vertices, " +
                      std::to_string(mesh.triangle_count()) + " triangles");
   d.json["vertices"] = mesh.vertex_count();
@@ -206,14 +206,14 @@ std::string front_text(const HeightFront& front) {
 }
 
 /// Describes by how much the front must exceed the lens for the whole surface to be lit.
-void describe_overhang(Description& d, const Lens& lens) {
+void describe_overhang(InfoResult& d, const Lens& lens) {
   if (!lens.setup.front) return;
   const double most = overhang(lens.surface, lens.setup);
   d.line("front lit", "to " + fixed(most, 3) + " mm beyond the lens's edges");
   d.json["front_overhang"] = most;
 }
 
-void describe_setup(Description& d, const OpticalSetup& setup) {
+void describe_setup(InfoResult& d, const OpticalSetup& setup) {
   d.line("light", light_text(setup));
   const bool clear = traits(setup.body).transmits;
   d.line(traits(setup.body).name,
@@ -256,7 +256,7 @@ void describe_setup(Description& d, const OpticalSetup& setup) {
   d.json["light"] = all.at("source");  // "source" is what was asked about.
 }
 
-void describe_provenance(Description& d, const nlohmann::json& provenance) {
+void describe_provenance(InfoResult& d, const nlohmann::json& provenance) {
   d.json["provenance"] = provenance;
   for (const auto& [name, value] : provenance.items()) {
     if (value.is_object()) continue;
@@ -264,9 +264,9 @@ void describe_provenance(Description& d, const nlohmann::json& provenance) {
   }
 }
 
-Description describe_lens(const fs::path& folder) {
+InfoResult describe_lens(const fs::path& folder) {
   const Lens lens = read_lens(folder);
-  Description d{{{{"kind", "lens"}, {"model", model_name(lens.model)}}}};
+  InfoResult d{{{{"kind", "lens"}, {"model", model_name(lens.model)}}}};
   describe_setup(d, lens.setup);
   describe_overhang(d, lens);
   d.line("model", model_name(lens.model));
@@ -283,9 +283,9 @@ Description describe_lens(const fs::path& folder) {
   return d;
 }
 
-Description describe_gcode(const fs::path& path) {
+InfoResult describe_gcode(const fs::path& path) {
   const GcodeSummary summary = summarise_gcode(path);
-  Description d{{{{"kind", "gcode"}}}};
+  InfoResult d{{{{"kind", "gcode"}}}};
   for (const std::string& comment : summary.header) d.line("comment", comment);
   const bool idle = summary.moves == 0 && summary.passed_over == 0;
   d.line("program", std::to_string(summary.lines) + " lines, " + std::to_string(summary.moves) +
@@ -309,9 +309,9 @@ Description describe_gcode(const fs::path& path) {
 }
 
 /// A solid as STEP or IGES.
-Description describe_solid(const fs::path& path, bool iges, const RunControl& control) {
+InfoResult describe_solid(const fs::path& path, bool iges, const RunControl& control) {
   const SolidContent content = iges ? inspect_iges(path, control) : inspect_step(path, control);
-  Description d{{{{"kind", "solid"}}}};
+  InfoResult d{{{{"kind", "solid"}}}};
   d.line("solids", std::to_string(content.solids) + " with " + std::to_string(content.faces) +
                        " faces, " + (content.valid ? "valid" : "not valid") + ", " +
                        (content.closed ? "closed" : "not closed"));
@@ -327,14 +327,14 @@ Description describe_solid(const fs::path& path, bool iges, const RunControl& co
   return d;
 }
 
-Description describe_picture(const fs::path& path, const Background& background,
-                             const RunControl& control) {
+InfoResult describe_picture(const fs::path& path, const Background& background,
+                            const RunControl& control) {
   const LoadedImage loaded = read_image(path, control, kDrawnSide, background);
   const auto values = loaded.image.values();
   const double count = static_cast<double>(values.size());
   const double mean = loaded.image.total() / count;
   const double black = static_cast<double>(std::count(values.begin(), values.end(), 0.0F)) / count;
-  Description d{{{{"kind", "picture"}}}};
+  InfoResult d{{{{"kind", "picture"}}}};
   d.line("picture", size_text(loaded.image.columns(), loaded.image.rows()) + " pixels");
   d.line("mean", fixed(mean, 4) + " of display white, in linear light");
   d.line("exact black", fixed(100.0 * black, 2) + " % of the pixels");
@@ -347,8 +347,8 @@ Description describe_picture(const fs::path& path, const Background& background,
 }
 
 /// A mesh in a package for printers or scenes.
-Description describe_package(const MeshContent& content) {
-  Description d{{{{"kind", "mesh"}}}};
+InfoResult describe_package(const MeshContent& content) {
+  InfoResult d{{{{"kind", "mesh"}}}};
   d.line("format", content.format);
   if (!content.title.empty()) d.line("title", content.title);
   d.line("mesh",
@@ -367,7 +367,7 @@ Description describe_package(const MeshContent& content) {
 }
 
 /// Describes a file that is no picture by its name; empty for a picture.
-std::optional<Description> describe(const fs::path& path, CommandFrame& frame) {
+std::optional<InfoResult> describe(const fs::path& path, CommandFrame& frame) {
   if (is_folder(path)) return describe_lens(path);
   if (has_extension(path, {".ngc", ".nc", ".gcode", ".tap"})) return describe_gcode(path);
   const bool iges = has_extension(path, {".igs", ".iges"});
@@ -381,7 +381,7 @@ std::optional<Description> describe(const fs::path& path, CommandFrame& frame) {
     }
   }
   if (!has_extension(path, {".ply", ".obj", ".stl", ".off"})) return std::nullopt;
-  Description d{{{{"kind", "mesh"}}}};
+  InfoResult d{{{{"kind", "mesh"}}}};
   describe_mesh(d, read_mesh(path));
   return d;
 }
@@ -391,7 +391,7 @@ struct InfoSettings {
   Background background;
 };
 
-void describe(lensforge::Description& d, InfoSettings& settings) {
+void describe(Description& d, InfoSettings& settings) {
   d.text("SOURCE", settings.source, "", "lens folder, solid, mesh, picture or G-code program")
       .needed = true;
   describe(d, settings.background);
@@ -399,7 +399,7 @@ void describe(lensforge::Description& d, InfoSettings& settings) {
 
 CommandResult run(CommandFrame& frame, InfoSettings& settings) {
   const std::string& source = settings.source;
-  std::optional<Description> described = describe(source, frame);
+  std::optional<InfoResult> described = describe(source, frame);
   if (described && frame.options().given("--background")) {
     throw InputError("--background: is for pictures, and " + source + " is none");
   }

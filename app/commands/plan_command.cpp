@@ -133,7 +133,7 @@ nlohmann::json print_json(const PrintForecast& print) {
           {"terrace_share", print.terraces.share}};
 }
 
-nlohmann::json json_of(const Proposal& proposal, const PlanSettings& settings) {
+nlohmann::json proposal_json(const Proposal& proposal, const PlanSettings& settings) {
   const ProposalForecast& f = proposal.forecast;
   nlohmann::json operations = nlohmann::json::array();
   for (const OperationMinutes& one : f.operations) {
@@ -268,7 +268,7 @@ CommandResult run(CommandFrame& frame, PlanSettings& settings) {
   CommandResult result;
   result.json["proposals"] = nlohmann::json::array();
   for (const Proposal& proposal : proposals) {
-    result.json["proposals"].push_back(json_of(proposal, settings));
+    result.json["proposals"].push_back(proposal_json(proposal, settings));
     result.text = with_word(std::move(result.text), text_of(proposal, settings), "\n");
   }
   return result;

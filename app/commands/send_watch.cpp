@@ -195,7 +195,7 @@ namespace {
 /// Bytes read to identify a file: more than any first line of ours.
 constexpr std::size_t kFirstLine = 1 << 16;
 
-[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
+[[noreturn]] void refuse_sink(const std::filesystem::path& path, const std::string& why) {
   throw InputError(path.string() + ": " + why);
 }
 
@@ -224,15 +224,16 @@ bool is_own_terminal(int descriptor) {
 
 void require_own(const std::filesystem::path& path, int descriptor, const SinkKind& kind) {
   struct stat about {};
-  if (::fstat(descriptor, &about) != 0) refuse(path, system_reason(errno));
-  if (S_ISBLK(about.st_mode)) refuse(path, "is a disk; name a file or a pipe");
+  if (::fstat(descriptor, &about) != 0) refuse_sink(path, system_reason(errno));
+  if (S_ISBLK(about.st_mode)) refuse_sink(path, "is a disk; name a file or a pipe");
   if (::isatty(descriptor) != 0 && !is_own_terminal(descriptor)) {
-    refuse(path,
-           "is a serial port or another terminal, where text may move a machine; name a file "
-           "or a pipe");
+    refuse_sink(path,
+                "is a serial port or another terminal, where text may move a machine; name a file "
+                "or a pipe");
   }
   if (!S_ISREG(about.st_mode) || about.st_size == 0 || kind.begins(first_line(path))) return;
-  refuse(path, std::string("exists and is no ") + kind.name + " of lensforge; name another file");
+  refuse_sink(path,
+              std::string("exists and is no ") + kind.name + " of lensforge; name another file");
 }
 
 /// "2026-07-30T14:05:09.250Z": now, UTC.
@@ -270,8 +271,8 @@ TextSink::TextSink(const std::filesystem::path& path, const SinkKind& kind)
                          O_WRONLY | O_CREAT | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666)) {
   const int error = errno;
   if (!file_.open()) {
-    refuse(path, "cannot be written: " +
-                     (error == ENXIO ? "nobody reads from this pipe" : system_reason(error)));
+    refuse_sink(path, "cannot be written: " +
+                          (error == ENXIO ? "nobody reads from this pipe" : system_reason(error)));
   }
   if (path != "-") require_own(path, file_.number(), kind);
 }
@@ -334,7 +335,7 @@ std::string standing_text(const SendEvent& event) {
 }
 
 /// Longest line, bytes: that of the options.
-constexpr std::size_t kLongestLine = 1 << 14;
+constexpr std::size_t kLongestLogLine = 1 << 14;
 
 /// "2026-07-30T14:05:09.250Z lensforge 0.1.0 send …", as written by begin().
 bool begins_log(std::string_view line) {
@@ -359,7 +360,8 @@ JobLog::JobLog(const SendSettings& settings, Warn warn) : warn_(std::move(warn))
 
 void JobLog::line(const std::string& text) {
   if (!file_.open()) return;
-  const std::string failure = file_.write(time_stamp() + "  " + printable_line(text, kLongestLine));
+  const std::string failure =
+      file_.write(time_stamp() + "  " + printable_line(text, kLongestLogLine));
   if (!failure.empty()) warn_("warning: the log stops here: " + failure);
 }
 
@@ -468,14 +470,14 @@ bool begins_events(std::string_view line) {
          is_text("time") && begins_with_time(first["time"].get<std::string>());
 }
 
-constexpr SinkKind kEvents{"events file", begins_events};
+constexpr SinkKind kEventSink{"events file", begins_events};
 
 }  // namespace
 
 JobEvents::JobEvents(const SendSettings& settings, Warn warn) : warn_(std::move(warn)) {
   if (settings.events.empty()) return;
   try {
-    file_ = TextSink(settings.events, kEvents);
+    file_ = TextSink(settings.events, kEventSink);
   } catch (const InputError& refused) {
     throw InputError(std::string("--events: ") + refused.what());
   }

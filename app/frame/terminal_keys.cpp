@@ -23,8 +23,8 @@ constexpr std::array kEnds = {SIGQUIT, SIGABRT, SIGSEGV, SIGBUS,  SIGFPE,
                               SIGILL,  SIGALRM, SIGUSR1, SIGUSR2, SIGXCPU};
 
 // A handler reaches nothing but globals.
-std::atomic<bool> taken;                          // NOLINT: see above
-termios before;                                   // NOLINT: see above
+std::atomic<bool> keys_taken;                     // NOLINT: see above
+termios state_before;                             // NOLINT: see above
 termios during;                                   // NOLINT: see above
 std::array<struct sigaction, kEnds.size()> ends;  // NOLINT: see above
 struct sigaction stop_before;                     // NOLINT: see above
@@ -38,7 +38,7 @@ bool in_foreground() { return ::tcgetpgrp(STDIN_FILENO) == ::getpgrp(); }
 bool may_read() { return ::isatty(STDIN_FILENO) == 0 || in_foreground(); }
 
 void take_terminal() {
-  if (taken && in_foreground()) ::tcsetattr(STDIN_FILENO, TCSANOW, &during);
+  if (keys_taken && in_foreground()) ::tcsetattr(STDIN_FILENO, TCSANOW, &during);
 }
 
 void end_by(int signal) {
@@ -104,14 +104,14 @@ void release_signals() {
 /// would stop the sender too. Earlier input is dropped: it was not meant for a running machine.
 bool enter() {
   if (::isatty(STDIN_FILENO) == 0 || !in_foreground()) return false;
-  if (::tcgetattr(STDIN_FILENO, &before) != 0) return false;
-  during = before;
+  if (::tcgetattr(STDIN_FILENO, &state_before) != 0) return false;
+  during = state_before;
   during.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
   during.c_iflag &= ~static_cast<tcflag_t>(IXON);
   during.c_cc[VMIN] = 1;
   during.c_cc[VTIME] = 0;
   during.c_cc[VSUSP] = _POSIX_VDISABLE;
-  taken = true;
+  keys_taken = true;
   handle_signals();
   return ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &during) == 0;
 }
@@ -128,7 +128,7 @@ void block_terminal_signals() {
 }  // namespace
 
 void restore_terminal() noexcept {
-  if (taken && in_foreground()) ::tcsetattr(STDIN_FILENO, TCSANOW, &before);
+  if (keys_taken && in_foreground()) ::tcsetattr(STDIN_FILENO, TCSANOW, &state_before);
 }
 
 namespace {
@@ -164,10 +164,10 @@ TerminalKeys::TerminalKeys(std::function<void()> abort, KeySource source)
 TerminalKeys::~TerminalKeys() {
   wake_write_ = Descriptor();
   if (reader_.joinable()) reader_.join();
-  if (!taken) return;
+  if (!keys_taken) return;
   restore_terminal();
   release_signals();
-  taken = false;
+  keys_taken = false;
 }
 
 std::optional<OperatorKey> TerminalKeys::next() {

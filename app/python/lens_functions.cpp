@@ -331,8 +331,9 @@ void add_plain_commands(py::module_& module) {
 }  // namespace
 
 void add_commands(py::module_& module) {
-  const Keywords of_design("design", description_of(app::DesignSettings()),
-                           {"--out", "--live", "--resume", "--force"});
+  const Keywords of_design(
+      "design", description_of(app::DesignSettings()),
+      {"--out", "--live", "--resume", "--force", "--color", "--lamps", "--lamp-gap"});
   module.attr("design_options") = of_design.text();
   module.def("design", [of_design](const py::object& picture, const py::dict& options,
                                    const py::object& progress) {

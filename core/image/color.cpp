@@ -93,6 +93,8 @@ std::vector<Eigen::Vector3d> balanced_colors(const std::vector<double>& waveleng
     if (!powers.empty()) colors.back() *= powers[k];
     sum += colors.back();
   }
+  // One wavelength makes no white, but its colour as bright as can be.
+  if (colors.size() == 1) return {colors[0].cwiseMax(0.0) / colors[0].maxCoeff()};
   // A channel that the wavelengths do not light stays black.
   const double least = 1e-3 * sum.cwiseAbs().maxCoeff();
   for (Eigen::Vector3d& color : colors) {
@@ -151,6 +153,97 @@ ColorImage color_picture(const std::vector<Image>& pictures, const std::vector<d
     for (int k = 0; k < 3; ++k) result.rgb.push_back(byte_of(rgb[k]));
   }
   return result;
+}
+
+namespace {
+
+/// X, Y and Z of the lamps (columns) with luminance 1.
+Eigen::Matrix3d colors_of(const std::array<double, 3>& wavelengths) {
+  Eigen::Matrix3d xyz;
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d color = color_matching(wavelengths[static_cast<std::size_t>(k)]);
+    xyz.col(k) = color / color.y();
+  }
+  return xyz;
+}
+
+Eigen::Matrix3d xyz_of_rgb() { return rgb_of_xyz().inverse(); }
+
+/// Luminances of the lamps that are white together.
+Eigen::Vector3d white_of(const std::array<double, 3>& wavelengths) {
+  return colors_of(wavelengths).fullPivLu().solve(xyz_of_rgb() * Eigen::Vector3d::Ones());
+}
+
+/// Every pixel's X, Y and Z. @param color  of values of 1 in the pictures (columns).
+std::vector<float> tristimulus_of(const std::array<Image, 3>& pictures,
+                                  const Eigen::Matrix3d& color) {
+  const std::size_t count = pictures[0].values().size();
+  std::vector<float> xyz(3 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d light(pictures[0].values()[i], pictures[1].values()[i],
+                                pictures[2].values()[i]);
+    Eigen::Map<Eigen::Vector3f> place(&xyz[3 * i]);
+    place = (color * light).cast<float>();
+  }
+  return xyz;
+}
+
+}  // namespace
+
+bool lamps_mix_white(const std::array<double, 3>& wavelengths) {
+  constexpr double kLeastShare = 0.01;  // of white's luminance: blue light has a few hundredths.
+  const Eigen::Vector3d white = white_of(wavelengths);
+  return white.allFinite() && white.minCoeff() > kLeastShare;
+}
+
+LampSplit split_by_lamps(const std::array<Image, 3>& rgb,
+                         const std::array<double, 3>& wavelengths) {
+  const Eigen::Vector3d white = white_of(wavelengths);
+  const Eigen::Matrix3d light_of =
+      white.cwiseInverse().asDiagonal() * colors_of(wavelengths).inverse() * xyz_of_rgb();
+  LampSplit split;
+  split.lamps.wavelengths = wavelengths;
+  split.lamps.pictures.fill(Image(rgb[0].columns(), rgb[0].rows()));
+  const std::size_t count = rgb[0].values().size();
+  Eigen::Vector3d most = Eigen::Vector3d::Ones();
+  std::size_t outside = 0;
+  constexpr double kVisible = 1e-3;  // of white
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d light =
+        light_of * Eigen::Vector3d(rgb[0].values()[i], rgb[1].values()[i], rgb[2].values()[i]);
+    if (light.minCoeff() < -kVisible) ++outside;
+    most = most.cwiseMax(light);
+    for (int k = 0; k < 3; ++k) {
+      split.lamps.pictures[static_cast<std::size_t>(k)].values()[i] =
+          static_cast<float>(std::max(0.0, light[k]));
+    }
+  }
+  split.outside = static_cast<double>(outside) / static_cast<double>(count);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double bright = most[static_cast<int>(k)];
+    split.lamps.brightness[k] = white[static_cast<int>(k)] * bright;
+    for (float& value : split.lamps.pictures[k].values()) value /= static_cast<float>(bright);
+  }
+  return split;
+}
+
+std::vector<float> tristimulus(const std::array<Image, 3>& rgb) {
+  return tristimulus_of(rgb, xyz_of_rgb());
+}
+
+std::vector<float> tristimulus(const LampPictures& lamps) {
+  const Eigen::Vector3d brightness(lamps.brightness.data());
+  return tristimulus_of(lamps.pictures, colors_of(lamps.wavelengths) * brightness.asDiagonal());
+}
+
+ColorImage color_picture(std::span<const float> xyz, int columns, int rows) {
+  ColorImage picture{columns, rows, {}};
+  picture.rgb.reserve(xyz.size());
+  for (std::size_t i = 0; i < xyz.size(); i += 3) {
+    const Eigen::Vector3d rgb = rgb_of_xyz() * Eigen::Vector3d(xyz[i], xyz[i + 1], xyz[i + 2]);
+    for (const double value : rgb) picture.rgb.push_back(byte_of(value));
+  }
+  return picture;
 }
 
 }  // namespace lensforge

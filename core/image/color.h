@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -42,8 +43,12 @@ inline double luminance_rec709(const std::array<double, 3>& light) {
   return 0.2126 * light[0] + 0.7152 * light[1] + 0.0722 * light[2];
 }
 
-/// The same, exact for grey: the weighted sum of equal channels rounds.
-inline double grey_light(const std::array<double, 3>& light) {
+/// What is kept of red, green and blue light. All of it is exact for grey, where the weighted sum
+/// of equal channels rounds.
+inline double grey_light(const std::array<double, 3>& light, KeptLight kept = KeptLight::kAll) {
+  if (kept == KeptLight::kRed) return light[0];
+  if (kept == KeptLight::kGreen) return light[1];
+  if (kept == KeptLight::kBlue) return light[2];
   return light[0] == light[1] && light[1] == light[2] ? light[0] : luminance_rec709(light);
 }
 
@@ -85,5 +90,37 @@ Image mixed(const std::vector<Image>& pictures, const std::vector<double>& share
 /// outside sRGB are clipped. @pre equal sizes, one picture per wavelength.
 ColorImage color_picture(const std::vector<Image>& pictures, const std::vector<double>& wavelengths,
                          const std::vector<double>& powers = {});
+
+// A coloured picture as the sum of three lamps' pictures.
+
+/// Pictures in the light of three lamps of one wavelength each.
+struct LampPictures {
+  std::array<double, 3> wavelengths{};  ///< nm
+  /// Luminance of each lamp where its picture is 1; 1 is that of white.
+  std::array<double, 3> brightness{};
+  std::array<Image, 3> pictures;  ///< Linear, at most 1.
+};
+
+/// The lamps' light that adds up to a picture.
+struct LampSplit {
+  LampPictures lamps;
+  /// Share of the pixels whose colour is outside the lamps' triangle: a lamp would have to give
+  /// less than no light, and gives none.
+  double outside = 0.0;
+};
+
+/// Splits a picture. @param rgb  linear red, green and blue of sRGB.
+/// @pre lamps_mix_white().
+LampSplit split_by_lamps(const std::array<Image, 3>& rgb, const std::array<double, 3>& wavelengths);
+
+/// True if white can be mixed of light of these wavelengths, nm.
+bool lamps_mix_white(const std::array<double, 3>& wavelengths);
+
+/// CIE 1931 X, Y and Z of every pixel, Y 1 at white D65.
+std::vector<float> tristimulus(const std::array<Image, 3>& rgb);
+std::vector<float> tristimulus(const LampPictures& lamps);
+
+/// The sRGB picture of tristimulus values; colours outside sRGB are clipped.
+ColorImage color_picture(std::span<const float> xyz, int columns, int rows);
 
 }  // namespace lensforge

@@ -49,6 +49,10 @@ class Image {
   std::vector<float> values_;
 };
 
+/// The light of a coloured picture that its grey picture has: all of it by brightness (Rec. 709),
+/// or that of one of sRGB's primaries.
+enum class KeptLight { kAll, kRed, kGreen, kBlue };
+
 /// Maximum side of a picture; a larger file is refused before its pixels are read.
 inline constexpr int kMaxImageSide = 16384;
 

@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <istream>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -59,10 +61,10 @@ std::string Background::text() const {
   return text;
 }
 
-double Background::light() const {
+double Background::light(KeptLight kept) const {
   std::array<double, 3> light{};
   std::transform(rgb.begin(), rgb.end(), light.begin(), [](int v) { return decode(v / 255.0); });
-  return grey_light(light);
+  return grey_light(light, kept);
 }
 
 std::optional<std::string> hidden_by(const Image& image, const Background& background) {
@@ -93,7 +95,24 @@ const pictures_module::Table& pictures_module::table() {
 
 LoadedImage read_image(const fs::path& path, const RunControl& run, int drawn_side,
                        const Background& background) {
-  return pictures_module::table().read_image(path, run, drawn_side, background);
+  return pictures_module::table().read_image(path, run, drawn_side, background, KeptLight::kAll);
+}
+
+LoadedColors read_colors(const fs::path& path, const RunControl& run, int drawn_side,
+                         const Background& background) {
+  const auto read = [&](KeptLight kept) {
+    return pictures_module::table().read_image(path, run, drawn_side, background, kept);
+  };
+  LoadedImage whole = read(KeptLight::kAll);  // Its checks are of all light.
+  std::erase(whole.changes, pictures_module::kColorTurned);
+  return {
+      {read(KeptLight::kRed).image, read(KeptLight::kGreen).image, read(KeptLight::kBlue).image},
+      std::move(whole.changes)};
+}
+
+std::vector<float> color_differences(std::span<const float> a, std::span<const float> b) {
+  LF_CHECK(a.size() == b.size() && a.size() % 3 == 0, std::to_string(a.size()));
+  return pictures_module::table().color_differences(a, b);
 }
 
 void write_image(const Image& image, const fs::path& path, const RunControl& control) {
@@ -110,8 +129,8 @@ std::vector<unsigned char> encode_png(const ColorImage& image) {
 
 bool is_svg(std::istream& file) { return pictures_module::table().is_svg(file); }
 
-SvgPicture draw_svg(const fs::path& path, int longer_side, const RunControl& run) {
-  return pictures_module::table().draw_svg(path, longer_side, run);
+SvgPicture draw_svg(const fs::path& path, int longer_side, const RunControl& run, KeptLight kept) {
+  return pictures_module::table().draw_svg(path, longer_side, run, kept);
 }
 
 }  // namespace lensforge

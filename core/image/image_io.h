@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,8 @@ struct Background {
   /// "black", "white" or "#RRGGBB". @throw InputError naming option, value and rule.
   static Background parse(const std::string& text);
   [[nodiscard]] std::string text() const;
-  /// Linear luminance; 1 is white.
-  [[nodiscard]] double light() const;
+  /// Linear light; 1 is white.
+  [[nodiscard]] double light(KeptLight kept = KeptLight::kAll) const;
 
   friend bool operator==(const Background&, const Background&) = default;
 };
@@ -61,6 +62,20 @@ inline constexpr double kRingingShare = 0.3;
 ///        the message names the file. Interrupted, at most 0.1 s after the stop request.
 LoadedImage read_image(const std::filesystem::path& path, const RunControl& run = {},
                        int drawn_side = kDrawnSide, const Background& background = {});
+
+/// A coloured picture as read.
+struct LoadedColors {
+  std::array<Image, 3> light;  ///< Linear red, green and blue of sRGB; negative values are 0.
+  std::vector<std::string> changes;
+};
+
+/// The same picture in colour; a grey one has three equal channels. @throw as read_image().
+LoadedColors read_colors(const std::filesystem::path& path, const RunControl& run = {},
+                         int drawn_side = kDrawnSide, const Background& background = {});
+
+/// CIEDE2000 colour differences of pixels (Sharma, Wu and Dalal 2005), in front of white D65.
+/// @param a, b  CIE 1931 tristimulus values of equally many pixels, X, Y, Z each; Y is 1 at white.
+std::vector<float> color_differences(std::span<const float> a, std::span<const float> b);
 
 /// Writes 16-bit sRGB-encoded grey PNG (clipped to 0 … 1), or, for .exr, 32-bit float linear grey.
 /// The file appears whole or not at all.

@@ -29,6 +29,7 @@
 #include "core/image/color.h"
 #include "core/image/image_io.h"
 #include "core/image/picture_outline.h"
+#include "core/image/pictures_module.h"
 #include "core/io/files.h"
 #include "core/sandbox/child_work.h"
 #include "core/text/version.h"
@@ -515,12 +516,12 @@ struct ColorProfile::Transform {
   bool has_curves = false;  ///< Curves and primaries: the channels' light adds up.
 };
 
-ColorProfile::ColorProfile(std::shared_ptr<const Transform> transform)
-    : transform_(std::move(transform)) {
+ColorProfile::ColorProfile(std::shared_ptr<const Transform> transform, KeptLight kept)
+    : transform_(std::move(transform)), kept_(kept) {
   white_ = computed({1.0, 1.0, 1.0});
 }
 
-std::optional<ColorProfile> ColorProfile::open(Bytes bytes) {
+std::optional<ColorProfile> ColorProfile::open(Bytes bytes, KeptLight kept) {
   const Handle profile = opened(bytes);
   if (!profile) return std::nullopt;
   const cmsColorSpaceSignature space = cmsGetColorSpace(profile.get());
@@ -533,7 +534,7 @@ std::optional<ColorProfile> ColorProfile::open(Bytes bytes) {
       profile.get(), made->is_grey ? TYPE_GRAY_DBL : TYPE_RGB_DBL, light.get(), TYPE_RGB_DBL,
       INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE | cmsFLAGS_NOCACHE));
   if (!made->transform) return std::nullopt;
-  ColorProfile result(std::move(made));
+  ColorProfile result(std::move(made), kept);
   if (!(std::isfinite(result.white_) && result.white_ > 0.0)) return std::nullopt;
   return result;
 }
@@ -567,7 +568,7 @@ std::string ColorProfile::name_of(Bytes bytes) {
 double ColorProfile::computed(const std::array<double, 3>& stored) const {
   std::array<double, 3> rgb{};
   cmsDoTransform(transform_->transform.get(), stored.data(), rgb.data(), 1);
-  return luminance_rec709(rgb);
+  return kept_ == KeptLight::kAll ? luminance_rec709(rgb) : grey_light(rgb, kept_);
 }
 
 void ColorProfile::tabulate(int most) {
@@ -611,10 +612,30 @@ bool ColorProfile::is_srgb() const {
       alone[c] = value;
       std::array<double, 3> linear{};
       linear[c] = decode(value);
-      if (differs(light(alone), luminance_rec709(linear))) return false;
+      if (differs(light(alone), grey_light(linear, kept_))) return false;
     }
   }
   return true;
+}
+
+std::vector<float> pictures_module::color_differences(std::span<const float> a,
+                                                      std::span<const float> b) {
+  constexpr cmsCIEXYZ kWhite{0.95047, 1.0, 1.08883};  // D65
+  const auto lab_at = [&](std::span<const float> xyz, std::size_t i) {
+    const cmsCIEXYZ color{static_cast<double>(xyz[i]), static_cast<double>(xyz[i + 1]),
+                          static_cast<double>(xyz[i + 2])};
+    cmsCIELab lab{};
+    cmsXYZ2Lab(&kWhite, &lab, &color);
+    return lab;
+  };
+  std::vector<float> differences;
+  differences.reserve(a.size() / 3);
+  for (std::size_t i = 0; i < a.size(); i += 3) {
+    const cmsCIELab first = lab_at(a, i);
+    const cmsCIELab second = lab_at(b, i);
+    differences.push_back(static_cast<float>(cmsCIE2000DeltaE(&first, &second, 1.0, 1.0, 1.0)));
+  }
+  return differences;
 }
 
 }  // namespace lensforge

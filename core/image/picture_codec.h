@@ -129,7 +129,9 @@ std::vector<unsigned char> encode_rows(const std::string& what, OIIO::ImageSpec 
 class ColorProfile {
  public:
   /// Returns nothing if the profile is broken or for other colours.
-  static std::optional<ColorProfile> open(std::span<const unsigned char> bytes);
+  /// @param kept  the light of light().
+  static std::optional<ColorProfile> open(std::span<const unsigned char> bytes,
+                                          KeptLight kept = KeptLight::kAll);
 
   /// The profile's colours: "grey", "RGB", "CMYK", …; empty if it is broken.
   static std::string colors_of(std::span<const unsigned char> bytes);
@@ -139,7 +141,7 @@ class ColorProfile {
   /// True if it equals sRGB to the rounding of eight bits.
   [[nodiscard]] bool is_srgb() const;
 
-  /// The luminance of stored values, linear. @param stored  one value for a grey profile, three for
+  /// The light of stored values, linear. @param stored  one value for a grey profile, three for
   /// RGB (equal for grey).
   [[nodiscard]] double light(const std::array<double, 3>& stored) const;
 
@@ -149,10 +151,11 @@ class ColorProfile {
 
  private:
   struct Transform;
-  explicit ColorProfile(std::shared_ptr<const Transform> transform);
+  ColorProfile(std::shared_ptr<const Transform> transform, KeptLight kept);
   [[nodiscard]] double computed(const std::array<double, 3>& stored) const;
 
   std::shared_ptr<const Transform> transform_;
+  KeptLight kept_;
   double white_ = 1.0;
   std::array<std::vector<double>, 3> tables_;  ///< Light of each channel alone.
 };

@@ -33,7 +33,6 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Message for a picture whose colours were turned to grey.
-constexpr const char* kColourTurned = "colour turned to luminance (Rec. 709)";
 
 /// Linear light from which a colour is not dark: middle grey on a display.
 constexpr double kBright = 0.2;
@@ -57,7 +56,8 @@ class PictureLight {
  public:
   /// @param background  linear light behind the picture. @param changes  gets the colour encoding
   ///        that is used.
-  PictureLight(const PictureSource& source, double background, std::vector<std::string>& changes);
+  PictureLight(const PictureSource& source, const Background& background, KeptLight kept,
+               std::vector<std::string>& changes);
 
   /// @throw InputError naming the file, pixel and channel for a value that is not finite.
   [[nodiscard]] float grey(const float* pixel, int column, int row);
@@ -95,6 +95,7 @@ class PictureLight {
   Channels channels_;
   bool unassociated_;
   double background_;
+  KeptLight kept_;
   ColorSpace space_;
   std::vector<double> table_;            ///< Light of 16-bit values; empty: computed each time.
   std::optional<ColorProfile> profile_;  ///< Used instead of the space.
@@ -139,13 +140,14 @@ std::string words_of(std::span<const unsigned char> profile) {
   return "embedded colour profile" + (name.empty() ? "" : " '" + name + "'");
 }
 
-PictureLight::PictureLight(const PictureSource& source, double background,
-                           std::vector<std::string>& changes)
+PictureLight::PictureLight(const PictureSource& source, const Background& background,
+                           KeptLight kept, std::vector<std::string>& changes)
     : path_(source.path()),
       names_(source.spec().channelnames),
       channels_(choose(source.spec(), source.is("gif"))),
       unassociated_(source.spec().get_int_attribute("oiio:UnassociatedAlpha") != 0),
-      background_(background) {
+      background_(background.light(kept)),
+      kept_(kept) {
   choose_colors(source, changes);
   if (profile_ || !has_short_numbers(source.spec())) return;
   if (space_.curve == ColorSpace::Curve::kLinear) return;
@@ -194,7 +196,7 @@ void PictureLight::choose_colors(const PictureSource& source, std::vector<std::s
   const std::string colors = ColorProfile::colors_of(bytes);
   // A grey picture may have an RGB profile: its value counts for all three channels.
   const bool fits = colors == "RGB" || (colors == "grey" && channels_.light.size() == 1);
-  if (fits) profile_ = ColorProfile::open(bytes);
+  if (fits) profile_ = ColorProfile::open(bytes, kept_);
   if (!profile_) {
     const bool other = !fits && !colors.empty();
     changes.push_back(words_of(bytes) + " is " + (other ? "of " + colors + " values" : "broken") +
@@ -224,7 +226,7 @@ double PictureLight::light_of(const std::array<double, 3>& stored, double alpha)
   const std::array<double, 3> light{decoded(stored[0]) * alpha, decoded(stored[1]) * alpha,
                                     decoded(stored[2]) * alpha};
   if (light[0] != light[1] || light[1] != light[2]) saw_colour_ = true;
-  return grey_light(light);
+  return grey_light(light, kept_);
 }
 
 std::array<double, 3> PictureLight::stored_of(const float* pixel, int column, int row) {
@@ -291,7 +293,7 @@ void PictureLight::report(std::vector<std::string>& changes) const {
                       " with values below 0, the lowest " +
                       number_text(static_cast<double>(lowest_.value), 3) + ", set to 0");
   }
-  if (saw_colour_) changes.emplace_back(kColourTurned);
+  if (saw_colour_) changes.emplace_back(pictures_module::kColorTurned);
   if (channels_.left_out > 0) {
     changes.push_back(std::to_string(channels_.left_out) + " further channel" +
                       (channels_.left_out > 1 ? "s" : "") + " left out");
@@ -325,14 +327,14 @@ struct Window {
 
 /// OpenEXR distinguishes the stored and the displayed window. TIFF positions are print layout and
 /// are ignored.
-Window shown_window(const PictureSource& source, const Background& background,
+Window shown_window(const PictureSource& source, float background,
                     std::vector<std::string>& changes) {
   const OIIO::ImageSpec& spec = source.spec();
   if (!source.is("openexr") || spec.full_width < 1 || spec.full_height < 1) {
     return {spec.width, spec.height, 0, 0, 0.0F};
   }
   const Window window{spec.full_width, spec.full_height, spec.x - spec.full_x, spec.y - spec.full_y,
-                      static_cast<float>(background.light())};
+                      background};
   check_picture_size(source.path(), window.columns, window.rows);
   if (window.left != 0 || window.top != 0 || window.columns != spec.width ||
       window.rows != spec.height) {
@@ -423,12 +425,13 @@ struct Reading {
 };
 
 /// Runs in the decoding process.
-std::string decode_picture(const fs::path& path, const Background& background, RowSender& sender,
-                           const RunControl& run) {
+std::string decode_picture(const fs::path& path, const Background& background, KeptLight kept,
+                           RowSender& sender, const RunControl& run) {
   PictureSource source(path);
   Reading reading;
-  PictureLight light(source, background.light(), reading.changes);
-  const Window window = shown_window(source, background, reading.changes);
+  PictureLight light(source, background, kept, reading.changes);
+  const Window window =
+      shown_window(source, static_cast<float>(background.light(kept)), reading.changes);
   sender.begin(window.columns, window.rows, window.fill);
   send_pixels(source, window, light, sender, run);
   light.report(reading.changes);
@@ -439,15 +442,16 @@ std::string decode_picture(const fs::path& path, const Background& background, R
   return reading.text();
 }
 
-LoadedImage read_pixels(const fs::path& path, const RunControl& run, const Background& background) {
+LoadedImage read_pixels(const fs::path& path, const RunControl& run, const Background& background,
+                        KeptLight kept) {
   const auto decode = [&](RowSender& sender, const RunControl& inner) {
-    return decode_picture(path, background, sender, inner);
+    return decode_picture(path, background, kept, sender, inner);
   };
   DecodedPicture decoded = decode_in_child(path, decode, run);
   Reading reading = Reading::of(decoded.text);
   LoadedImage loaded{upright(std::move(decoded.image), reading.orientation),
                      std::move(reading.changes)};
-  report_cover(path, reading.cover, background, loaded);
+  if (kept == KeptLight::kAll) report_cover(path, reading.cover, background, loaded);
   if (reading.orientation > 1) {
     loaded.changes.push_back("turned upright (EXIF orientation " +
                              std::to_string(reading.orientation) + ")");
@@ -464,20 +468,21 @@ std::string first_of(const std::vector<std::string>& left_out) {
 }
 
 LoadedImage read_drawing(const fs::path& path, const RunControl& run, int longer_side,
-                         const Background& background) {
-  SvgPicture picture = pictures_module::draw_svg(path, longer_side, run);
+                         const Background& background, KeptLight kept) {
+  SvgPicture picture = pictures_module::draw_svg(path, longer_side, run, kept);
   LoadedImage loaded{std::move(picture.light), {}};
   loaded.changes.push_back("drawn at " + std::to_string(loaded.image.columns()) + " x " +
                            std::to_string(loaded.image.rows()) + " pixels");
-  if (picture.colour) loaded.changes.emplace_back(kColourTurned);
+  if (picture.colour) loaded.changes.emplace_back(pictures_module::kColorTurned);
   Cover cover;
-  const auto behind = static_cast<float>(background.light());
+  const auto behind = static_cast<float>(background.light(kept));
   for (std::size_t i = 0; i < loaded.image.values().size(); ++i) {
     const float covered = picture.coverage.values()[i];
     float& light = loaded.image.values()[i];
     cover.add(static_cast<double>(light), static_cast<double>(covered));
     light += (1.0F - covered) * behind;
   }
+  if (kept != KeptLight::kAll) return loaded;  // What is hidden is told of all light.
   const std::string left_out = first_of(picture.left_out);
   if (!cover.open && !left_out.empty() && loaded.image.total() == 0.0) {
     refuse_picture(path, "is black all over" + left_out);
@@ -492,11 +497,11 @@ LoadedImage read_drawing(const fs::path& path, const RunControl& run, int longer
 }  // namespace
 
 LoadedImage pictures_module::read_image(const fs::path& path, const RunControl& run, int drawn_side,
-                                        const Background& background) {
+                                        const Background& background, KeptLight kept) {
   if (std::ifstream file = open_input(path); is_svg(file)) {
-    return read_drawing(path, run, drawn_side, background);
+    return read_drawing(path, run, drawn_side, background, kept);
   }
-  return read_pixels(path, run, background);
+  return read_pixels(path, run, background, kept);
 }
 
 namespace {
@@ -721,6 +726,7 @@ extern "C" const lensforge::ModuleHead* lensforge_pictures() {
   namespace module = lensforge::pictures_module;
   static const module::Table table{.head = {lensforge::module_mark(), sizeof(module::Table)},
                                    .read_image = module::read_image,
+                                   .color_differences = module::color_differences,
                                    .write_image = module::write_image,
                                    .write_color_image = module::write_color_image,
                                    .encode_png = module::encode_png,

@@ -202,7 +202,7 @@ std::pair<double, double> size_of(const fs::path& path, RsvgHandle* handle) {
 /// Adds up cairo's output, 4 bytes per point: blue, green and red times alpha, alpha.
 class PixelSum {
  public:
-  PixelSum() {
+  explicit PixelSum(KeptLight kept) : kept_(kept) {
     for (std::size_t i = 0; i < light_.size(); ++i)
       light_[i] = decode(static_cast<double>(i) / 255.0);
   }
@@ -215,11 +215,9 @@ class PixelSum {
     const std::uint32_t green = point >> 8U & 0xFFU;
     const std::uint32_t blue = point & 0xFFU;
     if (red != green || green != blue) colour_ = true;
-    const double luminance =
-        red == green && green == blue
-            ? light(red, alpha)
-            : luminance_rec709({light(red, alpha), light(green, alpha), light(blue, alpha)});
-    sum_ += luminance * static_cast<double>(alpha) / 255.0;
+    const double kept =
+        grey_light({light(red, alpha), light(green, alpha), light(blue, alpha)}, kept_);
+    sum_ += kept * static_cast<double>(alpha) / 255.0;
   }
 
   /// Mean light and coverage of `points` points; resets the sums.
@@ -237,6 +235,7 @@ class PixelSum {
     return light_[std::min<std::uint32_t>((channel * 255U + alpha / 2U) / alpha, 255U)];
   }
 
+  KeptLight kept_;
   std::array<double, 256> light_{};
   double sum_ = 0.0;
   double coverage_ = 0.0;
@@ -284,13 +283,13 @@ void draw(const fs::path& path, RsvgHandle* handle, std::pair<double, double> si
 }
 
 /// Every pixel is the mean over samples² points. @pre samples divides the sides of the surface.
-SvgPicture averaged(cairo_surface_t* surface, int samples) {
+SvgPicture averaged(cairo_surface_t* surface, int samples, KeptLight kept) {
   const int columns = cairo_image_surface_get_width(surface) / samples;
   const int rows = cairo_image_surface_get_height(surface) / samples;
   const unsigned char* const bytes = cairo_image_surface_get_data(surface);
   const std::ptrdiff_t stride = cairo_image_surface_get_stride(surface);
   SvgPicture picture{Image(columns, rows), Image(columns, rows), false, {}, {}};
-  PixelSum sum;
+  PixelSum sum(kept);
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       for (std::ptrdiff_t y = 0; y < samples; ++y) {
@@ -309,7 +308,7 @@ SvgPicture averaged(cairo_surface_t* surface, int samples) {
 }
 
 /// Runs in the child.
-SvgPicture drawn(const fs::path& path, int longer_side) {
+SvgPicture drawn(const fs::path& path, int longer_side, KeptLight kept) {
   SvgLog log;
   std::vector<std::string> remarks;
   const std::string xml = with_fit_pictures(svg_text(path), remarks);
@@ -319,7 +318,7 @@ SvgPicture drawn(const fs::path& path, int longer_side) {
   if (!needs.problem.empty()) refuse_picture(path, needs.problem);
   const Surface surface = surface_for(path, size, longer_side);
   draw(path, handle.get(), size, surface.get());
-  SvgPicture picture = averaged(surface.get(), samples_for(longer_side));
+  SvgPicture picture = averaged(surface.get(), samples_for(longer_side), kept);
   picture.remarks = std::move(remarks);
   picture.remarks.insert(picture.remarks.end(), needs.remarks.begin(), needs.remarks.end());
   picture.left_out = needs.left_out;
@@ -368,13 +367,14 @@ ChildLimits limits_for(int longer_side) {
 
 }  // namespace
 
-SvgPicture pictures_module::draw_svg(const fs::path& path, int longer_side, const RunControl& run) {
+SvgPicture pictures_module::draw_svg(const fs::path& path, int longer_side, const RunControl& run,
+                                     KeptLight kept) {
   const auto work = [&](const RunControl&) {
     // Each thread of librsvg's filters uses address space, which is limited.
     if (std::thread::hardware_concurrency() > kMaxThreads) {
       setenv("RAYON_NUM_THREADS", std::to_string(kMaxThreads).c_str(), 1);
     }
-    return to_bytes(drawn(path, longer_side));
+    return to_bytes(drawn(path, longer_side, kept));
   };
   try {
     return from_bytes(

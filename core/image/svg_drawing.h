@@ -31,7 +31,7 @@ bool is_svg(std::istream& file);
 
 /// An SVG file as pixels.
 struct SvgPicture {
-  Image light;          ///< Luminance in linear light in front of black.
+  Image light;          ///< Linear light in front of black, by default the luminance.
   Image coverage;       ///< Alpha: 1 opaque, 0 transparent.
   bool colour = false;  ///< True if colours were turned to grey.
   /// Changes in plain words: fonts that are not installed, pictures turned upright.
@@ -49,6 +49,8 @@ struct SvgPicture {
 ///        size, needs a character that no installed font has, crashes the libraries, exceeds the
 ///        time or memory limits above, or needs a picture larger than kMaxImageSide or the memory.
 ///        Interrupted within 0.1 s.
-SvgPicture draw_svg(const std::filesystem::path& path, int longer_side, const RunControl& run = {});
+/// @param kept  the light of `light`.
+SvgPicture draw_svg(const std::filesystem::path& path, int longer_side, const RunControl& run = {},
+                    KeptLight kept = KeptLight::kAll);
 
 }  // namespace lensforge

@@ -35,7 +35,7 @@ std::vector<double> Spectrum::shares() const { return brightness_shares(waveleng
 Spectrum parse_spectrum(const std::string& text, const std::string& name) {
   const auto refuse = [&] {
     throw InputError(name + " " + text +
-                     ": must be 2 to 5 rising numbers of nanometres from 380 to 780, with a power "
+                     ": must be 1 to 5 rising numbers of nanometres from 380 to 780, with a power "
                      "above 0 after a colon at each or at none; 450,550,650 works");
   };
   const auto count = static_cast<int>(std::count(text.begin(), text.end(), ',')) + 1;
@@ -184,7 +184,7 @@ void require_spectrum(const OpticalSetup& setup) {
   const std::string text = spectrum_text(setup.spectrum);
   require(
       is_valid(setup.spectrum), "spectrum", text,
-      "2 to 5 rising wavelengths from 380 to 780 nm, with powers above 0 at all or none, and an "
+      "1 to 5 rising wavelengths from 380 to 780 nm, with powers above 0 at all or none, and an "
       "Abbe number from 10 to 200");
   if (!setup.spectrum.none()) require_absent(setup, "spectrum", text);
 }

@@ -35,7 +35,7 @@ struct Dispersion {
 };
 
 /// Minimum and maximum number of wavelengths.
-inline constexpr int kMinWavelengths = 2;
+inline constexpr int kMinWavelengths = 1;
 inline constexpr int kMaxWavelengths = 5;
 
 /// Light of several wavelengths, and the dispersion of the lens's material.
@@ -53,7 +53,7 @@ struct Spectrum {
 
 /// Wavelengths in nm from "450,550,650", with the source's powers from "450:0.6,550:1,650:0.8".
 /// @param name  the option's name, for the message.
-/// @throw InputError unless there are 2 to 5 ascending wavelengths from 380 to 780, all with powers
+/// @throw InputError unless there are 1 to 5 ascending wavelengths from 380 to 780, all with powers
 ///        above 0 or all without.
 Spectrum parse_spectrum(const std::string& text, const std::string& name);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/two_face_start.h"
+#include "design/schedule/two_faces.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/IterativeLinearSolvers>

@@ -27,7 +27,6 @@
 #include "design/optimize/lbfgs.h"
 #include "design/render.h"
 #include "design/schedule/guided_optimization.h"
-#include "design/schedule/two_face_start.h"
 
 namespace lensforge {
 namespace {

@@ -201,7 +201,7 @@ void describe_wavelengths(Description& d, Spectrum& spectrum) {
   constexpr const char* kName = "--wavelengths";
   d.text(
       {.name = kName,
-       .help = "two to five wavelengths, nm, whose pictures together are to be the target, by "
+       .help = "one to five wavelengths, nm, whose pictures together are to be the target, by "
                "brightness; with the source's power at each after a colon, or the same at each",
        .unit = "LIST"},
       [&spectrum] { return spectrum_text(spectrum); },
@@ -407,7 +407,7 @@ void describe_colours(Description& d, Spectrum& spectrum) {
   constexpr const char* kName = "--wavelengths";
   d.text(
       {.name = kName,
-       .help = "two to five wavelengths, nm: a picture in colour, of a source with the power "
+       .help = "one to five wavelengths, nm: a picture in colour, of a source with the power "
                "after a colon at each, or the same, and how far dispersion moves their light "
                "apart; a lens has its own default",
        .unit = "LIST"},

@@ -275,6 +275,86 @@ TEST(SpectralColor, AllWavelengthsTogetherAreWhiteAndEachAloneIsItsColour) {
   EXPECT_LT(red[2], 60);
 }
 
+std::array<Image, 3> one_pixel(const Eigen::Vector3d& rgb) {
+  std::array<Image, 3> picture;
+  for (std::size_t k = 0; k < 3; ++k) {
+    picture[k] = Image(1, 1, static_cast<float>(rgb[static_cast<int>(k)]));
+  }
+  return picture;
+}
+
+constexpr std::array<double, 3> kLamps{625.0, 525.0, 465.0};
+
+TEST(ThreeLamps, TogetherHaveThePicturesColours) {
+  // Colours from white to those that the lamps still reach.
+  for (const Eigen::Vector3d& rgb :
+       {Eigen::Vector3d(1.0, 1.0, 1.0), Eigen::Vector3d(0.5, 0.5, 0.5),
+        Eigen::Vector3d(0.8, 0.3, 0.2), Eigen::Vector3d(0.2, 0.6, 0.3),
+        Eigen::Vector3d(0.2, 0.3, 0.7), Eigen::Vector3d(0.0, 0.0, 0.0)}) {
+    const LampSplit split = split_by_lamps(one_pixel(rgb), kLamps);
+    EXPECT_EQ(split.outside, 0.0) << rgb.transpose();
+    const std::vector<float> wanted = tristimulus(one_pixel(rgb));
+    const std::vector<float> reached = tristimulus(split.lamps);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(reached[k], wanted[k], 1e-6) << rgb.transpose();
+  }
+}
+
+TEST(ThreeLamps, WhiteIsAllOfEachAndItsLuminanceTheirSum) {
+  const LampSplit split = split_by_lamps(one_pixel(Eigen::Vector3d::Ones()), kLamps);
+  double luminance = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_NEAR(split.lamps.pictures[k].at(0, 0), 1.0, 1e-6);
+    luminance += split.lamps.brightness[k];
+  }
+  EXPECT_NEAR(luminance, 1.0, 1e-4);  // The standard's matrices have four digits.
+}
+
+TEST(ThreeLamps, AColourBeyondTheirTriangleIsToldAndItsPictureStaysPossible) {
+  const std::array<double, 3> pale{600.0, 550.0, 480.0};
+  const LampSplit split = split_by_lamps(one_pixel({0.0, 0.0, 1.0}), pale);
+  EXPECT_EQ(split.outside, 1.0);
+  for (const Image& picture : split.lamps.pictures) {
+    EXPECT_GE(picture.at(0, 0), 0.0F);
+    EXPECT_LE(picture.at(0, 0), 1.0F);
+  }
+}
+
+TEST(ThreeLamps, MixWhiteOnlyIfItLiesBetweenThem) {
+  EXPECT_TRUE(lamps_mix_white(kLamps));
+  EXPECT_TRUE(lamps_mix_white({638.0, 520.0, 450.0}));
+  EXPECT_FALSE(lamps_mix_white({700.0, 650.0, 600.0}));
+  EXPECT_FALSE(lamps_mix_white({625.0, 625.0, 465.0}));
+  EXPECT_FALSE(lamps_mix_white({540.0, 525.0, 465.0}));
+}
+
+/// CIE L*a*b* under D65 (CIE 15:2004, inverted).
+std::vector<float> xyz_of_lab(double l, double a, double b) {
+  const auto inverse = [](double t) {
+    return t > 6.0 / 29.0 ? t * t * t : 3.0 * (6.0 / 29.0) * (6.0 / 29.0) * (t - 4.0 / 29.0);
+  };
+  const double y = (l + 16.0) / 116.0;
+  return {static_cast<float>(0.95047 * inverse(y + a / 500.0)), static_cast<float>(inverse(y)),
+          static_cast<float>(1.08883 * inverse(y - b / 200.0))};
+}
+
+TEST(ColorDifference, HasTheValuesThatItsAuthorsPublished) {
+  // Sharma, Wu and Dalal 2005, table 1: pairs 1, 7, 14, 17 and 25.
+  const struct {
+    std::array<double, 3> first, second;
+    double difference;
+  } pairs[] = {{{50.0, 2.6772, -79.7751}, {50.0, 0.0, -82.7485}, 2.0425},
+               {{50.0, 0.0, 0.0}, {50.0, -1.0, 2.0}, 2.3669},
+               {{50.0, -0.0010, 2.4900}, {50.0, 0.0011, -2.4900}, 4.7461},
+               {{50.0, 2.5, 0.0}, {73.0, 25.0, -18.0}, 27.1492},
+               {{60.2574, -34.0099, 36.2677}, {60.4626, -34.1751, 39.4387}, 1.2644}};
+  for (const auto& pair : pairs) {
+    const auto [l, a, b] = pair.first;
+    const auto [m, c, d] = pair.second;
+    EXPECT_NEAR(color_differences(xyz_of_lab(l, a, b), xyz_of_lab(m, c, d)).at(0), pair.difference,
+                2e-3);
+  }
+}
+
 }  // namespace
 
 }  // namespace lensforge

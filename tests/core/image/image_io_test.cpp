@@ -109,6 +109,42 @@ TEST(ImageIo, GreyStoredAsColourIsTakenAsItIs) {
   EXPECT_THAT(loaded.changes, IsEmpty());
 }
 
+TEST(ImageIo, ColoursAreReadAsLinearLightOfThePrimaries) {
+  const TempFolder folder;
+  write_raw(folder / "c.png", pixel_spec(3, TypeDesc::UINT8), {1.0F, 0.2F, 0.6F});
+  const LoadedColors colors = read_colors(folder / "c.png");
+  EXPECT_EQ(colors.light[0].at(0, 0), 1.0F);
+  EXPECT_EQ(colors.light[1].at(0, 0), static_cast<float>(decode(0.2)));
+  EXPECT_EQ(colors.light[2].at(0, 0), static_cast<float>(decode(0.6)));
+  EXPECT_THAT(colors.changes, IsEmpty());
+
+  write_raw(folder / "g.png", pixel_spec(3, TypeDesc::UINT8), {0.6F, 0.6F, 0.6F});
+  for (const Image& light : read_colors(folder / "g.png").light) {
+    EXPECT_EQ(light, read_image(folder / "g.png").image);
+  }
+  write_bytes(folder / "a.svg",
+              "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 4 4'>"
+              "<rect width='4' height='4' fill='#ff0033'/></svg>");
+  const LoadedColors drawn = read_colors(folder / "a.svg", {}, 4);
+  EXPECT_EQ(drawn.light[0].at(1, 1), 1.0F);
+  EXPECT_EQ(drawn.light[1].at(1, 1), 0.0F);
+  EXPECT_NEAR(drawn.light[2].at(1, 1), decode(0.2), 1e-6);
+}
+
+TEST(ImageIo, ColoursShowTheBackgroundsColourWhereTheyAreTransparent) {
+  const TempFolder folder;
+  const std::string path = folder / "c.png";
+  write_raw(path, OIIO::ImageSpec(2, 1, 4, TypeDesc::UINT8),
+            {0.0F, 0.0F, 1.0F, 1.0F, 0.0F, 0.0F, 1.0F, 0.0F});
+  // Nothing of the picture is red, which a grey picture of red light alone would be refused for.
+  const LoadedColors colors = read_colors(path, {}, kDrawnSide, Background::parse("#00ff00"));
+  EXPECT_EQ(colors.light[0].total(), 0.0);
+  EXPECT_EQ(colors.light[1].at(0, 0), 0.0F);
+  EXPECT_EQ(colors.light[1].at(1, 0), 1.0F);
+  EXPECT_EQ(colors.light[2].at(0, 0), 1.0F);
+  EXPECT_EQ(colors.light[2].at(1, 0), 0.0F);
+}
+
 TEST(ImageIo, FurtherChannelsAreLeftOutWithAMessage) {
   const TempFolder folder;
   OIIO::ImageSpec spec = pixel_spec(5, TypeDesc::FLOAT);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gtest/gtest.h>
 
-#include "design/schedule/two_face_start.h"
+#include "design/schedule/two_faces.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
