@@ -26,7 +26,6 @@
 #include "app/frame/console.h"
 #include "app/frame/interrupt.h"
 #include "app/frame/option_set.h"
-#include "app/view/live_server.h"
 #include "app/view/loopback_server.h"
 #include "cam/cam.h"
 #include "cam/plan/cam_options.h"

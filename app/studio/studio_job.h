@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "app/frame/command_line.h"
-#include "app/view/live_server.h"
+#include "app/view/loopback_server.h"
 #include "core/io/files.h"
 
 namespace lensforge::app {

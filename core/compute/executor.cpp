@@ -102,4 +102,8 @@ double dot(const Executor& executor, std::span<const double> a, std::span<const 
   return parallel_sum<1>(executor, "dot", blocks, block, 1)[0];
 }
 
+#if !defined(LENSFORGE_CUDA)  // cuda/gpu.cu has it then.
+Gpu find_gpu() { return {false, "", "this build has no CUDA"}; }
+#endif
+
 }  // namespace lensforge

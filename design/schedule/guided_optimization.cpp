@@ -12,7 +12,6 @@
 #include "core/compute/scalar.h"
 #include "core/optics/light_path.h"
 #include "design/energy/spline_objective.h"
-#include "design/energy/wave_objective.h"
 #include "design/flux/flux_triangle.h"
 #include "design/optimize/grid_preconditioner.h"
 #include "design/schedule/guided_stage_on.h"

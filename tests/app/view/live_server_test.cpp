@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Answers of the page of a running design; no client can keep it from answering others or from
 // ending.
-#include "app/view/live_server.h"
-
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "app/view/loopback_server.h"
 #include "app/view/page_client.h"
 #include "core/error.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/wave_objective.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include "core/compute/scalar.h"
 #include "core/spline/control_net.h"
 #include "design/design.h"
+#include "design/energy/spline_objective.h"
 #include "design/finite_difference.h"
 #include "design/schedule/levels.h"
 #include "design/test_setups.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/energy/wave_objective.h"
+#include "design/energy/spline_objective.h"
 
 #include <cstddef>
 #include <span>

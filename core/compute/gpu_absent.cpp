@@ -1,8 +1,0 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/compute/executor.h"
-
-namespace lensforge {
-
-Gpu find_gpu() { return {false, "", "this build has no CUDA"}; }
-
-}  // namespace lensforge
