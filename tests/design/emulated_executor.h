@@ -151,7 +151,7 @@ class EmulatedExecutor {
   /// The words of a kernel's arguments with the bytes between members zero; all zero where the
   /// compiler cannot do that.
   template <class Functor>
-  static auto words_of(const Functor& functor) {
+  static auto words_of([[maybe_unused]] const Functor& functor) {
     std::array<std::uintptr_t, sizeof(Functor) / sizeof(std::uintptr_t)> words{};
 #if __has_builtin(__builtin_clear_padding) && !defined(__SANITIZE_ADDRESS__)
     Functor copy = functor;
