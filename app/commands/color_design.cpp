@@ -240,7 +240,7 @@ std::string nest_words(const DesignSettings& settings, const fs::path& out, cons
 }
 
 /// Compares the sum of three finished lenses with the picture and writes both.
-CommandResult add_up(CommandFrame& frame, const DesignSettings& settings, const fs::path& out,
+CommandResult add_up(const DesignSettings& settings, const fs::path& out,
                      const ColorTarget& target) {
   std::array<Lens, 3> lenses;
   for (std::size_t k = 0; k < 3; ++k) lenses[k] = read_lens(out / kLampNames[k]);
@@ -249,10 +249,7 @@ CommandResult add_up(CommandFrame& frame, const DesignSettings& settings, const 
   const int columns = lenses[0].setup.pixels.x();
   const int rows = lenses[0].setup.pixels.y();
   const std::string record =
-      nlohmann::json{
-          {"program", program_mark()}, {"options", frame.options().used()}, {"color", json}}
-          .dump(2) +
-      "\n";
+      nlohmann::json{{"program", program_mark()}, {"color", json}}.dump(2) + "\n";
   write_image(color_picture(result.wanted, columns, rows), out / kColorTarget);
   write_image(color_picture(result.reached, columns, rows), out / kColorPicture);
   write_whole_file(out / kColorJson, record);
@@ -297,7 +294,7 @@ CommandResult run_three_lamps(CommandFrame& frame, DesignSettings& settings) {
     if (result.exit_code != kDone) return result;
   }
   frame.begin_folder(out);
-  return add_up(frame, settings, out, target);
+  return add_up(settings, out, target);
 }
 
 }  // namespace lensforge::app
