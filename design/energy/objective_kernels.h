@@ -28,8 +28,8 @@ LF_HD inline ValueSlope area_barrier(double area, const AreaBarrier& barrier) {
 // Forward: surface → frames, Weingarten maps, image triangles, picture error, for one face, vertex
 // or pixel. Rays says how a face sends its light and is FacetRays or SmoothRays.
 
-/// Stores the frame of a face, and its flux where that is costly to compute. Returns its share of
-/// E_barr, which is infinite where the surface is not allowed.
+/// Stores the frame and area of a face, and its flux where that is costly to compute. Returns its
+/// share of E_barr, which is infinite where the surface is not allowed.
 struct MeasureFace {
   ObjectiveView o;
 
@@ -37,6 +37,7 @@ struct MeasureFace {
     const Corners t = o.corners(i);
     const FaceFrame frame = face_frame(t);
     o.scratch.frames[i] = frame;
+    o.scratch.doubled_areas[i] = frame.n.dot(area_normal(t));  // |N|, without its root
     const double area = plan_area(t);
     const CornerRays rays = o.incident_at(i);
     if (o.scratch.flux != nullptr) o.scratch.flux[i] = o.light.flux(t, rays);
@@ -80,7 +81,9 @@ struct FaceCentroid {
 struct FitMap {
   ObjectiveView o;
 
-  LF_HD void operator()(std::int64_t i) const { o.scratch.maps[i] = FittedFace(o, i).map; }
+  LF_HD void operator()(std::int64_t i) const {
+    o.scratch.maps[i] = FittedFaceOf<double>(face_ring(o, i), o.weights.edge).map;
+  }
 };
 
 /// Equal weights for all of a face's edges, as on a flat surface.
@@ -244,7 +247,6 @@ struct PullBackFace {
                                               const ImageTriangle* deposited) const {
     const Corners t = o.corners(i);
     const FaceFrame& frame = o.scratch.frames[i];
-    const double doubled_area = frame.n.dot(area_normal(t));  // |N|, without its root
     FaceBar bar;
     FaceSums sums;
     sums.goal = rays.pull_back(o, i, t, ray, deposited, bar);
@@ -259,7 +261,7 @@ struct PullBackFace {
       bar.corners.v1 += third;
       bar.corners.v2 += third;
     }
-    bar.area_normal += normalize_adjoint(frame.n, doubled_area, bar.n);
+    bar.area_normal += normalize_adjoint(frame.n, o.scratch.doubled_areas[i], bar.n);
     area_normal_adjoint(t, bar.area_normal, bar.corners);
     o.scratch.corner_bar[i] = bar.corners;
     return sums.packed();

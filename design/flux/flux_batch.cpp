@@ -16,33 +16,6 @@ using flux_detail::most;
 using flux_detail::PlaneTriangle;
 using flux_detail::Quadrants;
 
-/// Numbers of several triangles. Operators and ?: work on each by itself, with the bits of a single
-/// number's (an extension of GCC and Clang).
-template <int lanes>
-struct VectorOf {
-  typedef double Doubles __attribute__((vector_size(8 * lanes)));
-  typedef std::int32_t Ints __attribute__((vector_size(4 * lanes)));
-  typedef std::int64_t Longs __attribute__((vector_size(8 * lanes)));
-};
-
-template <class V>
-LF_INLINE V load(const double* from) {
-  V v;
-  std::memcpy(&v, from, sizeof v);
-  return v;
-}
-template <class V>
-LF_INLINE void store(const V& v, double* to) {
-  std::memcpy(to, &v, sizeof v);
-}
-
-/// What lies `offset` numbers after each of several places.
-template <class V, int... k>
-LF_INLINE V gather(const double* const* places, std::int64_t offset,
-                   std::integer_sequence<int, k...> /*lanes*/) {
-  return V{places[k][offset]...};
-}
-
 /// The triangles of one vector that touch at most 2 × 2 pixels, all of them in the picture.
 template <int lanes>
 struct SmallBatch {
@@ -59,27 +32,27 @@ struct SmallBatch {
   Mask usual;   ///< Others are to be computed one by one.
 
   LF_INLINE SmallBatch(const TriangleBatch& batch, int i, int columns, int rows)
-      : t{{load<V>(batch.x(0, i)), load<V>(batch.y(0, i))},
-          {load<V>(batch.x(1, i)), load<V>(batch.y(1, i))},
-          {load<V>(batch.x(2, i)), load<V>(batch.y(2, i))}},
-        flux(load<V>(batch.flux(i))) {
-    const V x0 = least(t.a.x, least(t.b.x, t.c.x));
-    const V x1 = most(t.a.x, most(t.b.x, t.c.x));
-    const V y0 = least(t.a.y, least(t.b.y, t.c.y));
-    const V y1 = most(t.a.y, most(t.b.y, t.c.y));
+      : t{{load_lanes<V>(batch.x(0, i)), load_lanes<V>(batch.y(0, i))},
+          {load_lanes<V>(batch.x(1, i)), load_lanes<V>(batch.y(1, i))},
+          {load_lanes<V>(batch.x(2, i)), load_lanes<V>(batch.y(2, i))}},
+        flux(load_lanes<V>(batch.flux(i))) {
+    const V x0 = least(t.a.x(), least(t.b.x(), t.c.x()));
+    const V x1 = most(t.a.x(), most(t.b.x(), t.c.x()));
+    const V y0 = least(t.a.y(), least(t.b.y(), t.c.y()));
+    const V y1 = most(t.a.y(), most(t.b.y(), t.c.y()));
     const V c0 = cell(x0);
     const V r0 = cell(y0);
     c1 = cell(x1);
     r1 = cell(y1);
     x = c0 < c1 ? c1 : x0;
     y = r0 < r1 ? r1 : y0;
-    doubled = (t.b.x - t.a.x) * (t.c.y - t.a.y) - (t.c.x - t.a.x) * (t.b.y - t.a.y);
+    doubled = (t.b.x() - t.a.x()) * (t.c.y() - t.a.y()) - (t.c.x() - t.a.x()) * (t.b.y() - t.a.y());
     const V half = 0.5 * doubled;
     const V area = half < 0.0 ? -half : half;
     const V width = x1 - x0;
     const V height = y1 - y0;
     const V extent = most(width, height);
-    const V sum = ((t.a.x + t.a.y) + (t.b.x + t.b.y)) + (t.c.x + t.c.y);
+    const V sum = ((t.a.x() + t.a.y()) + (t.b.x() + t.b.y())) + (t.c.x() + t.c.y());
     in_one = (c0 == c1) & (r0 == r1);
     usual = (c1 - c0 <= 1.0) & (r1 - r0 <= 1.0) & (c1 >= 1.0) & (r1 >= 1.0) &
             (c1 < static_cast<double>(columns)) & (r1 < static_cast<double>(rows)) & (sum < 1e300) &
@@ -87,7 +60,7 @@ struct SmallBatch {
   }
 
   [[nodiscard]] LF_INLINE PlaneTriangle<V> about_crossing() const {
-    return {{t.a.x - x, t.a.y - y}, {t.b.x - x, t.b.y - y}, {t.c.x - x, t.c.y - y}};
+    return {{t.a.x() - x, t.a.y() - y}, {t.b.x() - x, t.b.y() - y}, {t.c.x() - x, t.c.y() - y}};
   }
 
  private:
@@ -122,12 +95,12 @@ LF_INLINE void measure_deposits(const TriangleBatch& batch, int count, int colum
     const V above_right = density * areas.above_right;
     const V below_left = density * areas.below_left;
     const V below_right = density * areas.below_right;
-    store<V>((small.in_one ? none : above_left) * kFluxUnits, &deposits.share[0][i]);
-    store<V>((small.in_one ? none : above_right) * kFluxUnits, &deposits.share[1][i]);
-    store<V>((small.in_one ? none : below_left) * kFluxUnits, &deposits.share[2][i]);
-    store<V>((small.in_one ? small.flux : below_right) * kFluxUnits, &deposits.share[3][i]);
-    store<V>(small.usual ? small.c1 : none - 1.0, &deposits.column[i]);
-    store<V>(small.r1, &deposits.row[i]);
+    store_lanes<V>((small.in_one ? none : above_left) * kFluxUnits, &deposits.share[0][i]);
+    store_lanes<V>((small.in_one ? none : above_right) * kFluxUnits, &deposits.share[1][i]);
+    store_lanes<V>((small.in_one ? none : below_left) * kFluxUnits, &deposits.share[2][i]);
+    store_lanes<V>((small.in_one ? small.flux : below_right) * kFluxUnits, &deposits.share[3][i]);
+    store_lanes<V>(small.usual ? small.c1 : none - 1.0, &deposits.column[i]);
+    store_lanes<V>(small.r1, &deposits.row[i]);
   }
 }
 
@@ -147,20 +120,20 @@ LF_INLINE void measure_adjoints(const TriangleBatch& batch, int count,
                  static_cast<std::int64_t>(column[k]);
     }
     constexpr auto kLanes = std::make_integer_sequence<int, lanes>();
-    const Quadrants<V> g{gather<V>(below, -1 - cotangent.columns, kLanes),
-                         gather<V>(below, -cotangent.columns, kLanes), gather<V>(below, -1, kLanes),
-                         gather<V>(below, 0, kLanes)};
+    const Quadrants<V> g{gather_lanes<V>(below, -1 - cotangent.columns, kLanes),
+                         gather_lanes<V>(below, -cotangent.columns, kLanes),
+                         gather_lanes<V>(below, -1, kLanes), gather_lanes<V>(below, 0, kLanes)};
     PlaneTriangle<V> bar{};
     const V integral = flux_detail::gather_small(small.about_crossing(), g, bar);
     const V mean = flux_detail::mean_adjoint(small.t, small.doubled, small.flux, integral, bar);
     const V none{};
-    store<V>(small.in_one ? none : bar.a.x, bars.x(0, i));
-    store<V>(small.in_one ? none : bar.a.y, bars.y(0, i));
-    store<V>(small.in_one ? none : bar.b.x, bars.x(1, i));
-    store<V>(small.in_one ? none : bar.b.y, bars.y(1, i));
-    store<V>(small.in_one ? none : bar.c.x, bars.x(2, i));
-    store<V>(small.in_one ? none : bar.c.y, bars.y(2, i));
-    store<V>(small.in_one ? g.below_right : mean, bars.flux(i));
+    store_lanes<V>(small.in_one ? none : bar.a.x(), bars.x(0, i));
+    store_lanes<V>(small.in_one ? none : bar.a.y(), bars.y(0, i));
+    store_lanes<V>(small.in_one ? none : bar.b.x(), bars.x(1, i));
+    store_lanes<V>(small.in_one ? none : bar.b.y(), bars.y(1, i));
+    store_lanes<V>(small.in_one ? none : bar.c.x(), bars.x(2, i));
+    store_lanes<V>(small.in_one ? none : bar.c.y(), bars.y(2, i));
+    store_lanes<V>(small.in_one ? g.below_right : mean, bars.flux(i));
     std::memcpy(usual + i, &small.usual, sizeof small.usual);
   }
 }
@@ -168,12 +141,13 @@ LF_INLINE void measure_adjoints(const TriangleBatch& batch, int count,
 // Once for any processor and once for those with AVX2, without its fused operations, which round
 // otherwise.
 
-void measure_deposits_by_2(const TriangleBatch& batch, int count, int columns, int rows,
-                           BatchDeposits& deposits) {
+[[gnu::flatten]] void measure_deposits_by_2(const TriangleBatch& batch, int count, int columns,
+                                            int rows, BatchDeposits& deposits) {
   measure_deposits<2>(batch, count, columns, rows, deposits);
 }
-void measure_adjoints_by_2(const TriangleBatch& batch, int count, const FluxCotangent& cotangent,
-                           TriangleBatch& bars, std::int64_t* usual) {
+[[gnu::flatten]] void measure_adjoints_by_2(const TriangleBatch& batch, int count,
+                                            const FluxCotangent& cotangent, TriangleBatch& bars,
+                                            std::int64_t* usual) {
   measure_adjoints<2>(batch, count, cotangent, bars, usual);
 }
 #if defined(__x86_64__)
@@ -210,13 +184,6 @@ void measure_adjoints(Lanes lanes, const TriangleBatch& batch, int count,
 }
 
 }  // namespace
-
-Lanes widest_lanes() {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") != 0) return Lanes::kFour;
-#endif
-  return Lanes::kTwo;
-}
 
 void deposit_batch(const TriangleBatch& triangles, int count, const FluxAccumulator& image,
                    Lanes lanes) {

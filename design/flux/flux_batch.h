@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "design/flux/flux_triangle.h"
+#include "design/flux/lanes.h"
 
 namespace lensforge {
 
@@ -39,12 +40,6 @@ class TriangleBatch {
   alignas(64) double y_[3][kSize] = {};
   alignas(64) double flux_[kSize] = {};
 };
-
-/// Triangles in a vector of the processor.
-enum class Lanes : int { kTwo = 2, kFour = 4 };
-
-/// The most that this processor has.
-Lanes widest_lanes();
 
 /// deposit() of the first `count` triangles, with the same bits. Most of them should touch at most
 /// 2 × 2 pixels: these are computed several at a time, the others one by one.

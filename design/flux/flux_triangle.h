@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
+#include "design/flux/lanes.h"
 
 namespace lensforge {
 
@@ -223,34 +224,12 @@ LF_HD inline T most(const T& a, const T& b) {
   return a > b ? a : b;
 }
 
-/// A point or a difference of points.
-template <class T>
-struct Place {
-  T x;
-  T y;
-
-  LF_HD Place& operator+=(const Place& other) {
-    x += other.x;
-    y += other.y;
-    return *this;
-  }
-  [[nodiscard]] friend LF_HD Place operator-(const Place& a, const Place& b) {
-    return {a.x - b.x, a.y - b.y};
-  }
-  [[nodiscard]] friend LF_HD Place operator*(const T& scale, const Place& a) {
-    return {scale * a.x, scale * a.y};
-  }
-  [[nodiscard]] LF_HD T dot(const Place& other) const { return x * other.x + y * other.y; }
-};
-
-LF_HD inline Place<double> place(const Eigen::Vector2d& p) { return {p.x(), p.y()}; }
-
 /// Corners of a triangle, or derivatives by them.
 template <class T>
 struct PlaneTriangle {
-  Place<T> a;
-  Place<T> b;
-  Place<T> c;
+  PlaneVector<T> a;
+  PlaneVector<T> b;
+  PlaneVector<T> c;
 };
 
 /// Floor of a value that an int can hold. std::floor() is a library call on processors without an
@@ -335,23 +314,23 @@ LF_HD inline void add_piece(const T& u, const T& v, const T& dy, T& left, T& rig
 /// Adds an edge's part of ∮ x dy to every quadrant; over a closed polygon the sums are the signed
 /// areas. a and b are relative to the crossing of X and Y.
 template <class T>
-LF_HD inline void add_edge(const Place<T>& a, const Place<T>& b, Quadrants<T>& areas) {
+LF_HD inline void add_edge(const PlaneVector<T>& a, const PlaneVector<T>& b, Quadrants<T>& areas) {
   const T none{};
-  const T a_above = least(a.y, none);
-  const T b_above = least(b.y, none);
-  const auto from_above = a.y < none;
-  const auto to_above = b.y < none;
+  const T a_above = least(a.y(), none);
+  const T b_above = least(b.y(), none);
+  const auto from_above = a.y() < none;
+  const auto to_above = b.y() < none;
   const auto crosses = from_above != to_above;
   const T all = none + 1.0;
-  const T height = a.y - b.y;
+  const T height = a.y() - b.y();
   const T fall = crosses ? height : all;
-  const T x = a.x + (b.x - a.x) * (a.y / fall);
-  const T x_from_above = from_above ? a.x : x;
-  const T x_to_above = to_above ? b.x : x;
-  const T x_from_below = from_above ? x : a.x;
-  const T x_to_below = to_above ? x : b.x;
+  const T x = a.x() + (b.x() - a.x()) * (a.y() / fall);
+  const T x_from_above = from_above ? a.x() : x;
+  const T x_to_above = to_above ? b.x() : x;
+  const T x_from_below = from_above ? x : a.x();
+  const T x_to_below = to_above ? x : b.x();
   const T dy_above = b_above - a_above;
-  const T dy_below = (b.y - b_above) - (a.y - a_above);
+  const T dy_below = (b.y() - b_above) - (a.y() - a_above);
   add_piece(x_from_above, x_to_above, dy_above, areas.above_left, areas.above_right);
   add_piece(x_from_below, x_to_below, dy_below, areas.below_left, areas.below_right);
 }
@@ -384,16 +363,16 @@ struct HatWeights {
   T start;
   T end;
 
-  LF_HD HatWeights(const Place<T>& a, const Place<T>& b, const Quadrants<T>& g) {
+  LF_HD HatWeights(const PlaneVector<T>& a, const PlaneVector<T>& b, const Quadrants<T>& g) {
     const T none{};
-    const T sx = crossing_parameter(a.x, b.x);
-    const T sy = crossing_parameter(a.y, b.y);
+    const T sx = crossing_parameter(a.x(), b.x());
+    const T sy = crossing_parameter(a.y(), b.y());
     const T s0 = least(sx, sy);
     const T s1 = most(sx, sy);
-    const auto right_a = a.x >= none;
-    const auto right_b = b.x >= none;
-    const auto below_a = a.y >= none;
-    const auto below_b = b.y >= none;
+    const auto right_a = a.x() >= none;
+    const auto right_b = b.x() >= none;
+    const auto below_a = a.y() >= none;
+    const auto below_b = b.y() >= none;
     const T first = g.at(right_a, below_a);
     const T after_x = g.at(right_b, below_a);
     const T after_y = g.at(right_a, below_b);
@@ -407,9 +386,10 @@ struct HatWeights {
 
 /// Adds to a_bar and b_bar the derivatives of ∫ g by the ends of the edge a → b.
 template <class T>
-LF_HD inline void add_swept(const Place<T>& a, const Place<T>& b, const HatWeights<T>& weights,
-                            Place<T>& a_bar, Place<T>& b_bar) {
-  const Place<T> normal{b.y - a.y, a.x - b.x};
+LF_HD inline void add_swept(const PlaneVector<T>& a, const PlaneVector<T>& b,
+                            const HatWeights<T>& weights, PlaneVector<T>& a_bar,
+                            PlaneVector<T>& b_bar) {
+  const PlaneVector<T> normal{b.y() - a.y(), a.x() - b.x()};
   a_bar += weights.start * normal;
   b_bar += weights.end * normal;
 }
@@ -435,9 +415,9 @@ LF_HD inline T mean_adjoint(const PlaneTriangle<T>& t, const T& doubled, const T
   const T mean = integral * inverse_area;
   const T density = flux * inverse_area;
   const T scale = -0.5 * mean;
-  bar.a += scale * Place<T>{t.b.y - t.c.y, t.c.x - t.b.x};
-  bar.b += scale * Place<T>{t.c.y - t.a.y, t.a.x - t.c.x};
-  bar.c += scale * Place<T>{t.a.y - t.b.y, t.b.x - t.a.x};
+  bar.a += scale * PlaneVector<T>{t.b.y() - t.c.y(), t.c.x() - t.b.x()};
+  bar.b += scale * PlaneVector<T>{t.c.y() - t.a.y(), t.a.x() - t.c.x()};
+  bar.c += scale * PlaneVector<T>{t.a.y() - t.b.y(), t.b.x() - t.a.x()};
   bar = {density * bar.a, density * bar.b, density * bar.c};
   return mean;
 }
@@ -525,7 +505,7 @@ LF_HD inline std::int64_t to_units(double flux) {
 
 LF_HD inline PlaneTriangle<double> plane_triangle(const ImageTriangle& t,
                                                   const Eigen::Vector2d& crossing) {
-  return {place(t.p0 - crossing), place(t.p1 - crossing), place(t.p2 - crossing)};
+  return {t.p0 - crossing, t.p1 - crossing, t.p2 - crossing};
 }
 
 /// Deposit of a triangle that touches at most 2 × 2 pixels. Untouched pixels get exactly nothing.
@@ -680,11 +660,11 @@ struct GatherEdge {
   }
 
   /// Walks p → q and adds ∂G/∂p and ∂G/∂q.
-  LF_HD void edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, Place<double>& p_bar,
-                  Place<double>& q_bar) {
+  LF_HD void edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, PlaneVector<double>& p_bar,
+                  PlaneVector<double>& q_bar) {
     weight_p = weight_q = 0.0;
     walk_edge(p, q, cotangent.columns, cotangent.rows, *this);
-    const Place<double> normal{q.y() - p.y(), p.x() - q.x()};
+    const PlaneVector<double> normal{q.y() - p.y(), p.x() - q.x()};
     p_bar += weight_p * normal;
     q_bar += weight_q * normal;
   }
@@ -729,16 +709,15 @@ LF_HD inline ImageTriangle deposit_adjoint(const ImageTriangle& t, const FluxCot
         [&](int row, int column, double share) { bar.flux += share * cotangent.at(row, column); });
     return bar;
   }
-  detail::PlaneTriangle<double> bars{};
+  detail::PlaneTriangle<double> bars{{0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}};
   const double integral = small ? detail::gather_small(detail::plane_triangle(t, box.crossing()),
                                                        detail::quadrants_of(box, cotangent), bars)
                                 : detail::gather_large(t, cotangent, bars);
-  const detail::PlaneTriangle<double> corners{detail::place(t.p0), detail::place(t.p1),
-                                              detail::place(t.p2)};
+  const detail::PlaneTriangle<double> corners{t.p0, t.p1, t.p2};
   bar.flux = detail::mean_adjoint(corners, doubled, t.flux, integral, bars);
-  bar.p0 = {bars.a.x, bars.a.y};
-  bar.p1 = {bars.b.x, bars.b.y};
-  bar.p2 = {bars.c.x, bars.c.y};
+  bar.p0 = bars.a;
+  bar.p1 = bars.b;
+  bar.p2 = bars.c;
   return bar;
 }
 
