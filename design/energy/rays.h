@@ -14,6 +14,7 @@
 #include "design/energy/objective_view.h"
 #include "design/flux/columns.h"
 #include "design/flux/flux_batch.h"
+#include "design/flux/lanes.h"
 #include "design/flux/surface_projection.h"
 
 namespace lensforge {
@@ -96,7 +97,7 @@ template <std::size_t N, class Adjoint>
 FinishedSum<N> sum_in_batches(const Executor& executor, const char* kernel, std::int64_t count,
                               const Adjoint& adjoint) {
   const ObjectiveView& o = adjoint.o;
-  const auto sum_block = [&](std::int64_t block) __attribute__((flatten)) {
+  const auto sum_block = [&](std::int64_t block) LF_FLATTEN {
     std::array<double, N> sum{};
     TriangleBatch images;
     TriangleBatch bars;

@@ -41,19 +41,19 @@ struct TangentBasisOf {
   SpaceVector<T> e2;
 
   /// @pre n_z > −1.
-  LF_HD explicit TangentBasisOf(const SpaceVector<T>& n) {
+  LF_HD LF_INLINE explicit TangentBasisOf(const SpaceVector<T>& n) {
     const T share = 1.0 / (1.0 + n.z());
     const T mixed = -n.x() * n.y() * share;
     e1 = {1.0 - n.x() * n.x() * share, mixed, -n.x()};
     e2 = {mixed, 1.0 - n.y() * n.y() * share, -n.y()};
   }
   /// Coordinates of a vector's projection onto the tangent plane.
-  [[nodiscard]] LF_HD PlaneVector<T> local(const SpaceVector<T>& v) const {
+  [[nodiscard]] LF_HD LF_INLINE PlaneVector<T> local(const SpaceVector<T>& v) const {
     return {e1.x() * v.x() + e1.y() * v.y() + e1.z() * v.z(),
             e2.x() * v.x() + e2.y() * v.y() + e2.z() * v.z()};
   }
   /// The vector with these coordinates.
-  [[nodiscard]] LF_HD SpaceVector<T> world(const PlaneVector<T>& v) const {
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> world(const PlaneVector<T>& v) const {
     return {v.x() * e1.x() + v.y() * e2.x(), v.x() * e1.y() + v.y() * e2.y(),
             v.x() * e1.z() + v.y() * e2.z()};
   }
@@ -65,8 +65,8 @@ template <class T>
 struct LowerTriangle {
   T entries[3][3];
 
-  [[nodiscard]] LF_HD T& operator()(int row, int column) { return entries[row][column]; }
-  [[nodiscard]] LF_HD const T& operator()(int row, int column) const {
+  [[nodiscard]] LF_HD LF_INLINE T& operator()(int row, int column) { return entries[row][column]; }
+  [[nodiscard]] LF_HD LF_INLINE const T& operator()(int row, int column) const {
     return entries[row][column];
   }
 };
@@ -88,7 +88,7 @@ struct WeingartenMapOf {
   T c{};
 
   /// Half the trace.
-  [[nodiscard]] LF_HD T mean_curvature() const { return 0.5 * (a + b); }
+  [[nodiscard]] LF_HD LF_INLINE T mean_curvature() const { return 0.5 * (a + b); }
 };
 
 /// Local coordinates of a neighbour (Sun et al., Eqs. 11 and 12).
@@ -98,19 +98,19 @@ struct NeighbourOffsetOf {
   PlaneVector<T> n{T{}, T{}};
   T inverse{};  ///< 1/|d̄|², 1/mm²
 
-  LF_HD NeighbourOffsetOf() = default;
-  LF_HD NeighbourOffsetOf(const PlaneVector<T>& d_bar, const PlaneVector<T>& n_bar)
+  NeighbourOffsetOf() = default;
+  LF_HD LF_INLINE NeighbourOffsetOf(const PlaneVector<T>& d_bar, const PlaneVector<T>& n_bar)
       : d(d_bar), n(n_bar), inverse(1.0 / (d_bar.x() * d_bar.x() + d_bar.y() * d_bar.y())) {}
   /// @param basis  of i's tangent plane.
-  LF_HD NeighbourOffsetOf(const FaceFrameOf<T>& i, const TangentBasisOf<T>& basis,
-                          const FaceFrameOf<T>& j)
+  LF_HD LF_INLINE NeighbourOffsetOf(const FaceFrameOf<T>& i, const TangentBasisOf<T>& basis,
+                                    const FaceFrameOf<T>& j)
       : NeighbourOffsetOf(basis.local(j.c - i.c), basis.local(j.n)) {}
 
-  [[nodiscard]] LF_HD PlaneVector<T> residual(const WeingartenMapOf<T>& m) const {
+  [[nodiscard]] LF_HD LF_INLINE PlaneVector<T> residual(const WeingartenMapOf<T>& m) const {
     return {m.a * d.x() + m.c * d.y() - n.x(), m.c * d.x() + m.b * d.y() - n.y()};
   }
   /// δ of Sun et al., Eq. 13, 1/mm².
-  [[nodiscard]] LF_HD T mismatch(const WeingartenMapOf<T>& m) const {
+  [[nodiscard]] LF_HD LF_INLINE T mismatch(const WeingartenMapOf<T>& m) const {
     const PlaneVector<T> r = residual(m);
     return (r.x() * r.x() + r.y() * r.y()) * inverse;
   }
@@ -124,7 +124,7 @@ struct MismatchSlopeOf {
   PlaneVector<T> by_d;
   PlaneVector<T> by_n;
 
-  LF_HD MismatchSlopeOf(const NeighbourOffsetOf<T>& offset, const WeingartenMapOf<T>& m) {
+  LF_HD LF_INLINE MismatchSlopeOf(const NeighbourOffsetOf<T>& offset, const WeingartenMapOf<T>& m) {
     const PlaneVector<T> r = offset.residual(m);
     value = (r.x() * r.x() + r.y() * r.y()) * offset.inverse;
     const T scale = -2.0 * offset.inverse;
@@ -153,7 +153,7 @@ inline constexpr double kFitRegularization = 1e-9;
 /// uses cofactors, with one division, because every face solves a system in every evaluation; the
 /// divisions of a factorisation wait for each other.
 template <class Matrix, class Vector>
-LF_HD inline Vector solve_positive(const Matrix& m, const Vector& right) {
+LF_HD LF_INLINE Vector solve_positive(const Matrix& m, const Vector& right) {
   using T = typename Vector::Scalar;
   const T c00 = m(1, 1) * m(2, 2) - m(2, 1) * m(2, 1);
   const T c10 = m(2, 0) * m(2, 1) - m(1, 0) * m(2, 2);
@@ -177,7 +177,7 @@ struct FaceFitOf {
   SpaceVector<T> right{T{}, T{}, T{}};
 
   /// Adds a neighbour's term w |M d̄ − n̄|²/|d̄|².
-  LF_HD void add(const NeighbourOffsetOf<T>& offset, const T& weight) {
+  LF_HD LF_INLINE void add(const NeighbourOffsetOf<T>& offset, const T& weight) {
     const T w = weight * offset.inverse;
     const T wx = w * offset.d.x();
     const T wy = w * offset.d.y();
@@ -188,9 +188,11 @@ struct FaceFitOf {
         SpaceVector<T>(wx * offset.n.x(), wy * offset.n.y(), wy * offset.n.x() + wx * offset.n.y());
   }
   /// Adds H²A. @param doubled_area  of the face, mm².
-  LF_HD void add_mean_curvature(const T& doubled_area) { curvature += 0.125 * doubled_area; }
+  LF_HD LF_INLINE void add_mean_curvature(const T& doubled_area) {
+    curvature += 0.125 * doubled_area;
+  }
 
-  [[nodiscard]] LF_HD WeingartenMapOf<T> solve() const {
+  [[nodiscard]] LF_HD LF_INLINE WeingartenMapOf<T> solve() const {
     const T tikhonov = kFitRegularization * 2.0 * (xx + yy + curvature);
     LowerTriangle<T> lower;
     lower(0, 0) = xx + curvature + tikhonov;
@@ -260,7 +262,7 @@ struct FittedFaceOf {
   WeingartenMapOf<T> map;
   NeighbourOffsetOf<T> offsets[3];  ///< Zero at the boundary.
 
-  LF_HD FittedFaceOf(const FaceRing<T>& ring, double edge_weight) : basis(ring.frame.n) {
+  LF_HD LF_INLINE FittedFaceOf(const FaceRing<T>& ring, double edge_weight) : basis(ring.frame.n) {
     FaceFitOf<T> fit;
     for (int k = 0; k < 3; ++k) {
       if (!ring.inner[k]) continue;
@@ -281,7 +283,7 @@ struct BentFace {
   T curvature;
   T edge{};
 
-  LF_HD BentFace(const FaceRing<T>& ring, const ObjectiveWeights& weights) {
+  LF_HD LF_INLINE BentFace(const FaceRing<T>& ring, const ObjectiveWeights& weights) {
     const FittedFaceOf<T> face(ring, weights.edge);
     const T squared = face.map.mean_curvature() * face.map.mean_curvature();
     curvature = squared * (0.5 * ring.doubled_area);

@@ -216,11 +216,11 @@ namespace flux_detail {
 // vector of doubles of several triangles (flux_batch.cpp), each with the same bits.
 
 template <class T>
-LF_HD inline T least(const T& a, const T& b) {
+LF_HD LF_INLINE T least(const T& a, const T& b) {
   return a < b ? a : b;
 }
 template <class T>
-LF_HD inline T most(const T& a, const T& b) {
+LF_HD LF_INLINE T most(const T& a, const T& b) {
   return a > b ? a : b;
 }
 
@@ -283,11 +283,11 @@ struct Quadrants {
   T below_left{};
   T below_right{};
 
-  [[nodiscard]] LF_HD T sum() const {
+  [[nodiscard]] LF_HD LF_INLINE T sum() const {
     return (above_left + above_right) + (below_left + below_right);
   }
   template <class Mask>
-  [[nodiscard]] LF_HD T at(const Mask& right, const Mask& below) const {
+  [[nodiscard]] LF_HD LF_INLINE T at(const Mask& right, const Mask& below) const {
     const T above_value = right ? above_right : above_left;
     const T below_value = right ? below_right : below_left;
     return below ? below_value : above_value;
@@ -297,7 +297,7 @@ struct Quadrants {
 /// Adds ∫ min(x, 0) dy and ∫ max(x, 0) dy along a straight piece of height dy whose x runs from u
 /// to v. The share of x's range on the right is exactly 0 or 1 where the piece does not cross.
 template <class T>
-LF_HD inline void add_piece(const T& u, const T& v, const T& dy, T& left, T& right) {
+LF_HD LF_INLINE void add_piece(const T& u, const T& v, const T& dy, T& left, T& right) {
   const T none{};
   const T all = none + 1.0;
   const T u_right = most(u, none);
@@ -314,7 +314,8 @@ LF_HD inline void add_piece(const T& u, const T& v, const T& dy, T& left, T& rig
 /// Adds an edge's part of ∮ x dy to every quadrant; over a closed polygon the sums are the signed
 /// areas. a and b are relative to the crossing of X and Y.
 template <class T>
-LF_HD inline void add_edge(const PlaneVector<T>& a, const PlaneVector<T>& b, Quadrants<T>& areas) {
+LF_HD LF_INLINE void add_edge(const PlaneVector<T>& a, const PlaneVector<T>& b,
+                              Quadrants<T>& areas) {
   const T none{};
   const T a_above = least(a.y(), none);
   const T b_above = least(b.y(), none);
@@ -337,7 +338,7 @@ LF_HD inline void add_edge(const PlaneVector<T>& a, const PlaneVector<T>& b, Qua
 
 /// Signed areas of a triangle's parts. @pre the triangle lies within 2 × 2 pixels.
 template <class T>
-LF_HD inline Quadrants<T> quadrant_areas(const PlaneTriangle<T>& t) {
+LF_HD LF_INLINE Quadrants<T> quadrant_areas(const PlaneTriangle<T>& t) {
   Quadrants<T> areas;
   add_edge(t.a, t.b, areas);
   add_edge(t.b, t.c, areas);
@@ -348,7 +349,7 @@ LF_HD inline Quadrants<T> quadrant_areas(const PlaneTriangle<T>& t) {
 /// Parameter at which a coordinate that runs from `from` to `to` changes sign; 1 if it does not. It
 /// always divides, because compilers keep a branch around a division.
 template <class T>
-LF_HD inline T crossing_parameter(const T& from, const T& to) {
+LF_HD LF_INLINE T crossing_parameter(const T& from, const T& to) {
   const T none{};
   const T all = none + 1.0;
   const auto crosses = (from < none) != (to < none);
@@ -363,7 +364,8 @@ struct HatWeights {
   T start;
   T end;
 
-  LF_HD HatWeights(const PlaneVector<T>& a, const PlaneVector<T>& b, const Quadrants<T>& g) {
+  LF_HD LF_INLINE HatWeights(const PlaneVector<T>& a, const PlaneVector<T>& b,
+                             const Quadrants<T>& g) {
     const T none{};
     const T sx = crossing_parameter(a.x(), b.x());
     const T sy = crossing_parameter(a.y(), b.y());
@@ -386,9 +388,9 @@ struct HatWeights {
 
 /// Adds to a_bar and b_bar the derivatives of ∫ g by the ends of the edge a → b.
 template <class T>
-LF_HD inline void add_swept(const PlaneVector<T>& a, const PlaneVector<T>& b,
-                            const HatWeights<T>& weights, PlaneVector<T>& a_bar,
-                            PlaneVector<T>& b_bar) {
+LF_HD LF_INLINE void add_swept(const PlaneVector<T>& a, const PlaneVector<T>& b,
+                               const HatWeights<T>& weights, PlaneVector<T>& a_bar,
+                               PlaneVector<T>& b_bar) {
   const PlaneVector<T> normal{b.y() - a.y(), a.x() - b.x()};
   a_bar += weights.start * normal;
   b_bar += weights.end * normal;
@@ -398,8 +400,8 @@ LF_HD inline void add_swept(const PlaneVector<T>& a, const PlaneVector<T>& b,
 /// about the crossing of the pixel borders, so G is homogeneous of degree two and follows from its
 /// derivatives by Euler's theorem.
 template <class T>
-LF_HD inline T gather_small(const PlaneTriangle<T>& t, const Quadrants<T>& g,
-                            PlaneTriangle<T>& bar) {
+LF_HD LF_INLINE T gather_small(const PlaneTriangle<T>& t, const Quadrants<T>& g,
+                               PlaneTriangle<T>& bar) {
   add_swept(t.a, t.b, HatWeights<T>(t.a, t.b, g), bar.a, bar.b);
   add_swept(t.b, t.c, HatWeights<T>(t.b, t.c, g), bar.b, bar.c);
   add_swept(t.c, t.a, HatWeights<T>(t.c, t.a, g), bar.c, bar.a);
@@ -409,8 +411,8 @@ LF_HD inline T gather_small(const PlaneTriangle<T>& t, const Quadrants<T>& g,
 /// Turns the derivatives of G by the corners into those of E = Φ G / A, which is dE = (G/A) dΦ +
 /// (Φ/A)(dG − (G/A) dA); returns ∂E/∂Φ. @param doubled  2 A. @param integral  G.
 template <class T>
-LF_HD inline T mean_adjoint(const PlaneTriangle<T>& t, const T& doubled, const T& flux,
-                            const T& integral, PlaneTriangle<T>& bar) {
+LF_HD LF_INLINE T mean_adjoint(const PlaneTriangle<T>& t, const T& doubled, const T& flux,
+                               const T& integral, PlaneTriangle<T>& bar) {
   const T inverse_area = 2.0 / doubled;
   const T mean = integral * inverse_area;
   const T density = flux * inverse_area;

@@ -9,6 +9,13 @@
 
 #include "core/compute/host_device.h"
 
+/// Inlines everything that a function or lambda calls.
+#if defined(__CUDACC__)
+#define LF_FLATTEN
+#else
+#define LF_FLATTEN __attribute__((flatten))
+#endif
+
 namespace lensforge {
 
 // Arithmetic that works on one double or on several at a time. Functions for both are templates of
@@ -21,13 +28,15 @@ enum class Lanes : int { kTwo = 2, kFour = 4 };
 /// The most that this processor has.
 Lanes widest_lanes();
 
+#if !defined(__CUDACC__)
+
 /// Vectors of numbers, an extension of GCC and Clang. Operators and ?: work lane by lane.
 template <int lanes>
 struct VectorOf {
-  typedef double Doubles __attribute__((vector_size(8 * lanes)));
-  typedef float Floats __attribute__((vector_size(4 * lanes)));
-  typedef std::int32_t Ints __attribute__((vector_size(4 * lanes)));
-  typedef std::int64_t Longs __attribute__((vector_size(8 * lanes)));
+  using Doubles __attribute__((vector_size(8 * lanes))) = double;
+  using Floats __attribute__((vector_size(4 * lanes))) = float;
+  using Ints __attribute__((vector_size(4 * lanes))) = std::int32_t;
+  using Longs __attribute__((vector_size(8 * lanes))) = std::int64_t;
 };
 
 template <class V>
@@ -48,29 +57,32 @@ LF_INLINE V gather_lanes(const double* const* places, std::int64_t offset,
   return V{places[k][offset]...};
 }
 
+#endif
+
 /// A vector of the plane whose coordinates are of several triangles.
 template <class T>
 struct LanesInPlane {
   using Scalar = T;
   T x_, y_;
 
-  [[nodiscard]] T& x() { return x_; }
-  [[nodiscard]] T& y() { return y_; }
-  [[nodiscard]] const T& x() const { return x_; }
-  [[nodiscard]] const T& y() const { return y_; }
+  [[nodiscard]] LF_INLINE T& x() { return x_; }
+  [[nodiscard]] LF_INLINE T& y() { return y_; }
+  [[nodiscard]] LF_INLINE const T& x() const { return x_; }
+  [[nodiscard]] LF_INLINE const T& y() const { return y_; }
 
-  LanesInPlane& operator+=(const LanesInPlane& b) {
+  LF_INLINE LanesInPlane& operator+=(const LanesInPlane& b) {
     x_ += b.x_;
     y_ += b.y_;
     return *this;
   }
-  [[nodiscard]] friend LanesInPlane operator-(const LanesInPlane& a, const LanesInPlane& b) {
+  [[nodiscard]] LF_INLINE friend LanesInPlane operator-(const LanesInPlane& a,
+                                                        const LanesInPlane& b) {
     return {a.x_ - b.x_, a.y_ - b.y_};
   }
-  [[nodiscard]] friend LanesInPlane operator*(const T& scale, const LanesInPlane& a) {
+  [[nodiscard]] LF_INLINE friend LanesInPlane operator*(const T& scale, const LanesInPlane& a) {
     return {scale * a.x_, scale * a.y_};
   }
-  [[nodiscard]] T dot(const LanesInPlane& b) const { return x_ * b.x_ + y_ * b.y_; }
+  [[nodiscard]] LF_INLINE T dot(const LanesInPlane& b) const { return x_ * b.x_ + y_ * b.y_; }
 };
 
 /// A vector of space whose coordinates are of several triangles.
@@ -80,26 +92,29 @@ struct LanesInSpace {
   T x_, y_, z_;
 
   LanesInSpace() = default;
-  LanesInSpace(const T& x, const T& y, const T& z) : x_(x), y_(y), z_(z) {}
+  LF_INLINE LanesInSpace(const T& x, const T& y, const T& z) : x_(x), y_(y), z_(z) {}
 
-  [[nodiscard]] const T& x() const { return x_; }
-  [[nodiscard]] const T& y() const { return y_; }
-  [[nodiscard]] const T& z() const { return z_; }
+  [[nodiscard]] LF_INLINE const T& x() const { return x_; }
+  [[nodiscard]] LF_INLINE const T& y() const { return y_; }
+  [[nodiscard]] LF_INLINE const T& z() const { return z_; }
 
-  LanesInSpace& operator+=(const LanesInSpace& b) {
+  LF_INLINE LanesInSpace& operator+=(const LanesInSpace& b) {
     x_ += b.x_;
     y_ += b.y_;
     z_ += b.z_;
     return *this;
   }
-  [[nodiscard]] friend LanesInSpace operator-(const LanesInSpace& a, const LanesInSpace& b) {
+  [[nodiscard]] LF_INLINE friend LanesInSpace operator-(const LanesInSpace& a,
+                                                        const LanesInSpace& b) {
     return {a.x_ - b.x_, a.y_ - b.y_, a.z_ - b.z_};
   }
-  [[nodiscard]] friend LanesInSpace operator*(const T& scale, const LanesInSpace& a) {
+  [[nodiscard]] LF_INLINE friend LanesInSpace operator*(const T& scale, const LanesInSpace& a) {
     return {scale * a.x_, scale * a.y_, scale * a.z_};
   }
   /// In Eigen's order of additions.
-  [[nodiscard]] T dot(const LanesInSpace& b) const { return x_ * b.x_ + (y_ * b.y_ + z_ * b.z_); }
+  [[nodiscard]] LF_INLINE T dot(const LanesInSpace& b) const {
+    return x_ * b.x_ + (y_ * b.y_ + z_ * b.z_);
+  }
 };
 
 template <class T>
