@@ -16,7 +16,7 @@ namespace {
 
 using BendSum = std::array<double, 2>;
 
-/// Loads a struct of doubles that several places hold; `numbers` counts them before it.
+/// Three numbers that lie `offset` numbers after each of several places.
 template <int lanes>
 LF_INLINE LanesInSpace<typename VectorOf<lanes>::Doubles> gather_vector(const double* const* places,
                                                                         std::int64_t offset) {
