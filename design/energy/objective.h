@@ -164,6 +164,7 @@ class DesignObjectiveOn {
   Buffer<double> wanted_flux_;
 
   Buffer<FaceFrame> frames_;
+  Buffer<double> doubled_areas_;  ///< mm²
   Buffer<WeingartenMap> maps_;
   Buffer<FaceBend> bends_;
   Buffer<double> edge_weights_;
@@ -246,6 +247,7 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
     if (options_.model == SurfaceModel::kSpline) normals_bar_ = Buffer<double>(3 * vertices);
   }
   frames_ = Buffer<FaceFrame>(faces);
+  doubled_areas_ = Buffer<double>(faces);
   corner_bar_ = Buffer<Corners>(faces);
   if (options_.weights.smooth > 0.0) {
     maps_ = Buffer<WeingartenMap>(faces);
@@ -298,8 +300,8 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices, std::size_t 
       .incident = find_rays(executor_, light.path, vertices, mesh_.view().vertices, light.incident),
       .mesh = mesh_.view(),
       .goal = goal_view(),
-      .scratch = {frames_.data(), maps_.data(), bends_.data(), edge_weights_.data(),
-                  corner_bar_.data(),
+      .scratch = {frames_.data(), doubled_areas_.data(), maps_.data(), bends_.data(),
+                  edge_weights_.data(), corner_bar_.data(),
                   light.face_flux.size() > 0 ? light.face_flux.data() : nullptr},
       .aperture = aperture_.view()};
 }

@@ -28,8 +28,8 @@ LF_HD inline ValueSlope area_barrier(double area, const AreaBarrier& barrier) {
 // Forward: surface → frames, Weingarten maps, image triangles, picture error, for one face, vertex
 // or pixel. Rays says how a face sends its light and is FacetRays or SmoothRays.
 
-/// Stores the frame of a face, and its flux where that is costly to compute. Returns its share of
-/// E_barr, which is infinite where the surface is not allowed.
+/// Stores the frame and area of a face, and its flux where that is costly to compute. Returns its
+/// share of E_barr, which is infinite where the surface is not allowed.
 struct MeasureFace {
   ObjectiveView o;
 
@@ -37,6 +37,7 @@ struct MeasureFace {
     const Corners t = o.corners(i);
     const FaceFrame frame = face_frame(t);
     o.scratch.frames[i] = frame;
+    o.scratch.doubled_areas[i] = frame.n.dot(area_normal(t));  // |N|, without its root
     const double area = plan_area(t);
     const CornerRays rays = o.incident_at(i);
     if (o.scratch.flux != nullptr) o.scratch.flux[i] = o.light.flux(t, rays);
@@ -80,7 +81,9 @@ struct FaceCentroid {
 struct FitMap {
   ObjectiveView o;
 
-  LF_HD void operator()(std::int64_t i) const { o.scratch.maps[i] = FittedFace(o, i).map; }
+  LF_HD void operator()(std::int64_t i) const {
+    o.scratch.maps[i] = FittedFaceOf<double>(face_ring(o, i), o.weights.edge).map;
+  }
 };
 
 /// Equal weights for all of a face's edges, as on a flat surface.
@@ -166,11 +169,13 @@ struct FaceBar {
 };
 
 /// Weighted derivatives of the picture terms by one image triangle, and their values.
+/// @param deposited  deposit_adjoint() of the image in parts of pixels; null if not known.
 LF_HD inline GoalSums picture_adjoint(const ObjectiveView& o, const ImageTriangle& image,
-                                      ImageTriangle& bar) {
+                                      const ImageTriangle* deposited, ImageTriangle& bar) {
   const GoalView& goal = o.goal;
   GoalSums values;
-  bar = deposit_adjoint(magnified(image, goal.parts), goal.cotangent);
+  bar = deposited != nullptr ? *deposited
+                             : deposit_adjoint(magnified(image, goal.parts), goal.cotangent);
   bar = magnified(bar, goal.parts);
   values.boundary = boundary_term(image, goal.columns, goal.rows, o.weights.boundary, bar);
   return values;
@@ -183,15 +188,17 @@ LF_HD inline GoalSums rim_adjoint(const ObjectiveView& o, std::int64_t face,
   for (std::int64_t k = o.aperture.first[face]; o.aperture.pieces[k].face == face; ++k) {
     const TrianglePiece& piece = o.aperture.pieces[k].piece;
     ImageTriangle piece_bar;
-    values += picture_adjoint(o, image_of(image, piece), piece_bar);
+    values += picture_adjoint(o, image_of(image, piece), nullptr, piece_bar);
     image_of_adjoint(piece, piece_bar, bar);
   }
   return values;
 }
 
 /// Weighted derivatives of the goal's terms by one face's image triangle, and their values.
+/// @param deposited  as for picture_adjoint().
 LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
-                                   const ImageTriangle& image, ImageTriangle& bar) {
+                                   const ImageTriangle& image, const ImageTriangle* deposited,
+                                   ImageTriangle& bar) {
   const ObjectiveWeights& w = o.weights;
   const GoalView& goal = o.goal;
   GoalSums values;
@@ -206,7 +213,7 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
     return values;
   }
   if (!o.aperture.is_whole(face)) return rim_adjoint(o, face, image, bar);
-  values = picture_adjoint(o, image, bar);
+  values = picture_adjoint(o, image, deposited, bar);
   if (goal.led != nullptr && goal.led[face] != kNoPixel) {
     const std::int32_t pixel = goal.led[face];
     values.unlit = unlit_term(image, pixel, goal.columns, goal.target[pixel], w.image, bar);
@@ -230,13 +237,19 @@ struct PullBackFace {
   ObjectiveView o;
   Rays rays;
 
-  LF_HD FaceSums::Packed operator()(std::int64_t i) const {
+  using Ray = typename Rays::Ray;
+  [[nodiscard]] LF_HD Ray trace(std::int64_t i) const { return rays.trace(o, i); }
+
+  LF_HD FaceSums::Packed operator()(std::int64_t i) const { return (*this)(i, trace(i), nullptr); }
+  /// @param ray        Rays::trace().
+  /// @param deposited  as for picture_adjoint().
+  LF_HD LF_INLINE FaceSums::Packed operator()(std::int64_t i, const Ray& ray,
+                                              const ImageTriangle* deposited) const {
     const Corners t = o.corners(i);
     const FaceFrame& frame = o.scratch.frames[i];
-    const double doubled_area = frame.n.dot(area_normal(t));  // |N|, without its root
     FaceBar bar;
     FaceSums sums;
-    sums.goal = rays.pull_back(o, i, t, bar);
+    sums.goal = rays.pull_back(o, i, t, ray, deposited, bar);
     sums.barrier = barrier_adjoint(o, i, t, bar);
     if (o.weights.smooth > 0.0) {
       double area_bar = 0.0;
@@ -248,7 +261,7 @@ struct PullBackFace {
       bar.corners.v1 += third;
       bar.corners.v2 += third;
     }
-    bar.area_normal += normalize_adjoint(frame.n, doubled_area, bar.n);
+    bar.area_normal += normalize_adjoint(frame.n, o.scratch.doubled_areas[i], bar.n);
     area_normal_adjoint(t, bar.area_normal, bar.corners);
     o.scratch.corner_bar[i] = bar.corners;
     return sums.packed();

@@ -201,12 +201,17 @@ struct GoalView {
 };
 
 struct FaceBend;
-struct FaceFrame;
-struct WeingartenMap;
+template <class T>
+struct FaceFrameOf;
+using FaceFrame = FaceFrameOf<double>;
+template <class T>
+struct WeingartenMapOf;
+using WeingartenMap = WeingartenMapOf<double>;
 
 /// Values per face that one kernel leaves for the next.
 struct FaceScratch {
   FaceFrame* frames;
+  double* doubled_areas;  ///< F, mm²
   WeingartenMap* maps;
   FaceBend* bends;
   double* edge_weights;  ///< 3 × F, Ψ'(h⁰) of a face's three edges; 0 on the boundary.

@@ -12,14 +12,19 @@
 #include "core/compute/scalar.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/energy/objective_view.h"
+#include "design/flux/lanes.h"
 
 namespace lensforge {
 
+// T is a double, or a vector of the doubles of several faces (smoothness_batch.cpp), each with the
+// same bits.
+
 /// Centroid c and unit normal n of a triangle, n_z > −1 (Sun et al., section 3.3). The same struct
 /// holds derivatives by these vectors.
-struct FaceFrame {
-  Eigen::Vector3d n{0.0, 0.0, 0.0};
-  Eigen::Vector3d c{0.0, 0.0, 0.0};
+template <class T>
+struct FaceFrameOf {
+  SpaceVector<T> n{T{}, T{}, T{}};
+  SpaceVector<T> c{T{}, T{}, T{}};
 };
 
 LF_HD inline FaceFrame face_frame(const Corners& t) {
@@ -30,26 +35,39 @@ LF_HD inline FaceFrame face_frame(const Corners& t) {
 /// Two unit vectors at right angles to each other and to a normal, e2 = n × e1 (Duff et al. 2017,
 /// Building an Orthonormal Basis, Revisited). The paper takes e1 along an edge; the choice changes
 /// no term, because each face's map is fitted in this basis.
-struct TangentBasis {
-  Eigen::Vector3d e1;
-  Eigen::Vector3d e2;
+template <class T>
+struct TangentBasisOf {
+  SpaceVector<T> e1;
+  SpaceVector<T> e2;
 
   /// @pre n_z > −1.
-  LF_HD explicit TangentBasis(const Eigen::Vector3d& n) {
-    const double share = 1.0 / (1.0 + n.z());
-    const double mixed = -n.x() * n.y() * share;
+  LF_HD LF_INLINE explicit TangentBasisOf(const SpaceVector<T>& n) {
+    const T share = 1.0 / (1.0 + n.z());
+    const T mixed = -n.x() * n.y() * share;
     e1 = {1.0 - n.x() * n.x() * share, mixed, -n.x()};
     e2 = {mixed, 1.0 - n.y() * n.y() * share, -n.y()};
   }
   /// Coordinates of a vector's projection onto the tangent plane.
-  [[nodiscard]] LF_HD Eigen::Vector2d local(const Eigen::Vector3d& v) const {
+  [[nodiscard]] LF_HD LF_INLINE PlaneVector<T> local(const SpaceVector<T>& v) const {
     return {e1.x() * v.x() + e1.y() * v.y() + e1.z() * v.z(),
             e2.x() * v.x() + e2.y() * v.y() + e2.z() * v.z()};
   }
   /// The vector with these coordinates.
-  [[nodiscard]] LF_HD Eigen::Vector3d world(const Eigen::Vector2d& v) const {
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> world(const PlaneVector<T>& v) const {
     return {v.x() * e1.x() + v.y() * e2.x(), v.x() * e1.y() + v.y() * e2.y(),
             v.x() * e1.z() + v.y() * e2.z()};
+  }
+};
+using TangentBasis = TangentBasisOf<double>;
+
+/// The lower triangle of a symmetric matrix, indexed as Eigen's.
+template <class T>
+struct LowerTriangle {
+  T entries[3][3];
+
+  [[nodiscard]] LF_HD LF_INLINE T& operator()(int row, int column) { return entries[row][column]; }
+  [[nodiscard]] LF_HD LF_INLINE const T& operator()(int row, int column) const {
+    return entries[row][column];
   }
 };
 
@@ -63,53 +81,60 @@ struct TangentBasis {
 // neighbour j; r = M d̄ − n̄ residual; δ = |r|²/|d̄|² mismatch, h = δ(i, j) + δ(j, i).
 
 /// The symmetric 2 × 2 matrix of a face (Sun et al., Eq. 10), 1/mm.
-struct WeingartenMap {
-  double a = 0.0;
-  double b = 0.0;
-  double c = 0.0;
+template <class T>
+struct WeingartenMapOf {
+  T a{};
+  T b{};
+  T c{};
 
   /// Half the trace.
-  [[nodiscard]] LF_HD double mean_curvature() const { return 0.5 * (a + b); }
+  [[nodiscard]] LF_HD LF_INLINE T mean_curvature() const { return 0.5 * (a + b); }
 };
 
 /// Local coordinates of a neighbour (Sun et al., Eqs. 11 and 12).
-struct NeighbourOffset {
-  Eigen::Vector2d d;  ///< mm
-  Eigen::Vector2d n;
-  double inverse = 0.0;  ///< 1/|d̄|², 1/mm²
+template <class T>
+struct NeighbourOffsetOf {
+  PlaneVector<T> d{T{}, T{}};  ///< mm
+  PlaneVector<T> n{T{}, T{}};
+  T inverse{};  ///< 1/|d̄|², 1/mm²
 
-  LF_HD NeighbourOffset() : d(0.0, 0.0), n(0.0, 0.0) {}
-  LF_HD NeighbourOffset(const Eigen::Vector2d& d_bar, const Eigen::Vector2d& n_bar)
+  NeighbourOffsetOf() = default;
+  LF_HD LF_INLINE NeighbourOffsetOf(const PlaneVector<T>& d_bar, const PlaneVector<T>& n_bar)
       : d(d_bar), n(n_bar), inverse(1.0 / (d_bar.x() * d_bar.x() + d_bar.y() * d_bar.y())) {}
   /// @param basis  of i's tangent plane.
-  LF_HD NeighbourOffset(const FaceFrame& i, const TangentBasis& basis, const FaceFrame& j)
-      : NeighbourOffset(basis.local(j.c - i.c), basis.local(j.n)) {}
+  LF_HD LF_INLINE NeighbourOffsetOf(const FaceFrameOf<T>& i, const TangentBasisOf<T>& basis,
+                                    const FaceFrameOf<T>& j)
+      : NeighbourOffsetOf(basis.local(j.c - i.c), basis.local(j.n)) {}
 
-  [[nodiscard]] LF_HD Eigen::Vector2d residual(const WeingartenMap& m) const {
+  [[nodiscard]] LF_HD LF_INLINE PlaneVector<T> residual(const WeingartenMapOf<T>& m) const {
     return {m.a * d.x() + m.c * d.y() - n.x(), m.c * d.x() + m.b * d.y() - n.y()};
   }
   /// δ of Sun et al., Eq. 13, 1/mm².
-  [[nodiscard]] LF_HD double mismatch(const WeingartenMap& m) const {
-    return residual(m).squaredNorm() * inverse;
+  [[nodiscard]] LF_HD LF_INLINE T mismatch(const WeingartenMapOf<T>& m) const {
+    const PlaneVector<T> r = residual(m);
+    return (r.x() * r.x() + r.y() * r.y()) * inverse;
   }
 };
+using NeighbourOffset = NeighbourOffsetOf<double>;
 
 /// δ(i, j) and its derivatives by d̄ and n̄.
-struct MismatchSlope {
-  double value;
-  Eigen::Vector2d by_d;
-  Eigen::Vector2d by_n;
+template <class T>
+struct MismatchSlopeOf {
+  T value;
+  PlaneVector<T> by_d;
+  PlaneVector<T> by_n;
 
-  LF_HD MismatchSlope(const NeighbourOffset& offset, const WeingartenMap& m) {
-    const Eigen::Vector2d r = offset.residual(m);
+  LF_HD LF_INLINE MismatchSlopeOf(const NeighbourOffsetOf<T>& offset, const WeingartenMapOf<T>& m) {
+    const PlaneVector<T> r = offset.residual(m);
     value = (r.x() * r.x() + r.y() * r.y()) * offset.inverse;
-    const double scale = -2.0 * offset.inverse;
+    const T scale = -2.0 * offset.inverse;
     by_n = {scale * r.x(), scale * r.y()};
-    const double pull = 2.0 * value * offset.inverse;
+    const T pull = 2.0 * value * offset.inverse;
     by_d = {-m.a * by_n.x() - m.c * by_n.y() - pull * offset.d.x(),
             -m.c * by_n.x() - m.b * by_n.y() - pull * offset.d.y()};
   }
 };
+using MismatchSlope = MismatchSlopeOf<double>;
 
 /// Ψ_ν(√h) = 1 − exp(−h/(2ν²)) (Welsch function, Sun et al., Eq. 14) and its slope by h.
 LF_HD inline ValueSlope welsch(double h, double nu) {
@@ -127,55 +152,60 @@ inline constexpr double kFitRegularization = 1e-9;
 /// Solution of a symmetric positive definite system; only the matrix's lower triangle is read. It
 /// uses cofactors, with one division, because every face solves a system in every evaluation; the
 /// divisions of a factorisation wait for each other.
-LF_HD inline Eigen::Vector3d solve_positive(const Eigen::Matrix3d& m,
-                                            const Eigen::Vector3d& right) {
-  const double c00 = m(1, 1) * m(2, 2) - m(2, 1) * m(2, 1);
-  const double c10 = m(2, 0) * m(2, 1) - m(1, 0) * m(2, 2);
-  const double c20 = m(1, 0) * m(2, 1) - m(2, 0) * m(1, 1);
-  const double c11 = m(0, 0) * m(2, 2) - m(2, 0) * m(2, 0);
-  const double c21 = m(1, 0) * m(2, 0) - m(0, 0) * m(2, 1);
-  const double c22 = m(0, 0) * m(1, 1) - m(1, 0) * m(1, 0);
-  const double inverse = 1.0 / (m(0, 0) * c00 + m(1, 0) * c10 + m(2, 0) * c20);
-  return {inverse * (c00 * right[0] + c10 * right[1] + c20 * right[2]),
-          inverse * (c10 * right[0] + c11 * right[1] + c21 * right[2]),
-          inverse * (c20 * right[0] + c21 * right[1] + c22 * right[2])};
+template <class Matrix, class Vector>
+LF_HD LF_INLINE Vector solve_positive(const Matrix& m, const Vector& right) {
+  using T = typename Vector::Scalar;
+  const T c00 = m(1, 1) * m(2, 2) - m(2, 1) * m(2, 1);
+  const T c10 = m(2, 0) * m(2, 1) - m(1, 0) * m(2, 2);
+  const T c20 = m(1, 0) * m(2, 1) - m(2, 0) * m(1, 1);
+  const T c11 = m(0, 0) * m(2, 2) - m(2, 0) * m(2, 0);
+  const T c21 = m(1, 0) * m(2, 0) - m(0, 0) * m(2, 1);
+  const T c22 = m(0, 0) * m(1, 1) - m(1, 0) * m(1, 0);
+  const T inverse = 1.0 / (m(0, 0) * c00 + m(1, 0) * c10 + m(2, 0) * c20);
+  return {inverse * (c00 * right.x() + c10 * right.y() + c20 * right.z()),
+          inverse * (c10 * right.x() + c11 * right.y() + c21 * right.z()),
+          inverse * (c20 * right.x() + c21 * right.y() + c22 * right.z())};
 }
 
 /// Normal equations of the map (a, b, c) that minimises H²A + Σ w |M d̄ − n̄|²/|d̄|².
-struct FaceFit {
-  double xx = 0.0;  ///< Σ w d̄x²/|d̄|², and so on.
-  double yy = 0.0;
-  double xy = 0.0;
-  double curvature = 0.0;  ///< Coefficient of H²A for a + b, A/4.
-  Eigen::Vector3d right{0.0, 0.0, 0.0};
+template <class T>
+struct FaceFitOf {
+  T xx{};  ///< Σ w d̄x²/|d̄|², and so on.
+  T yy{};
+  T xy{};
+  T curvature{};  ///< Coefficient of H²A for a + b, A/4.
+  SpaceVector<T> right{T{}, T{}, T{}};
 
   /// Adds a neighbour's term w |M d̄ − n̄|²/|d̄|².
-  LF_HD void add(const NeighbourOffset& offset, double weight) {
-    const double w = weight * offset.inverse;
-    const double wx = w * offset.d.x();
-    const double wy = w * offset.d.y();
+  LF_HD LF_INLINE void add(const NeighbourOffsetOf<T>& offset, const T& weight) {
+    const T w = weight * offset.inverse;
+    const T wx = w * offset.d.x();
+    const T wy = w * offset.d.y();
     xx += wx * offset.d.x();
     yy += wy * offset.d.y();
     xy += wx * offset.d.y();
-    right += Eigen::Vector3d(wx * offset.n.x(), wy * offset.n.y(),
-                             wy * offset.n.x() + wx * offset.n.y());
+    right +=
+        SpaceVector<T>(wx * offset.n.x(), wy * offset.n.y(), wy * offset.n.x() + wx * offset.n.y());
   }
   /// Adds H²A. @param doubled_area  of the face, mm².
-  LF_HD void add_mean_curvature(double doubled_area) { curvature += 0.125 * doubled_area; }
+  LF_HD LF_INLINE void add_mean_curvature(const T& doubled_area) {
+    curvature += 0.125 * doubled_area;
+  }
 
-  [[nodiscard]] LF_HD WeingartenMap solve() const {
-    const double tikhonov = kFitRegularization * 2.0 * (xx + yy + curvature);
-    Eigen::Matrix3d lower;
+  [[nodiscard]] LF_HD LF_INLINE WeingartenMapOf<T> solve() const {
+    const T tikhonov = kFitRegularization * 2.0 * (xx + yy + curvature);
+    LowerTriangle<T> lower;
     lower(0, 0) = xx + curvature + tikhonov;
     lower(1, 0) = curvature;
     lower(2, 0) = xy;
     lower(1, 1) = yy + curvature + tikhonov;
     lower(2, 1) = xy;
     lower(2, 2) = xx + yy + 2.0 * tikhonov;
-    const Eigen::Vector3d m = solve_positive(lower, right);
-    return {m[0], m[1], m[2]};
+    const SpaceVector<T> m = solve_positive(lower, right);
+    return {m.x(), m.y(), m.z()};
   }
 };
+using FaceFit = FaceFitOf<double>;
 
 /// E_face of one triangle, H² A (Sun et al., Eq. 15), and its slope by the area. Dimensionless.
 /// @param area mm²
@@ -200,27 +230,87 @@ struct FaceBend {
   float by_area;                 ///< mm²
 };
 
-/// A face with the map that minimises its F. @pre frames are up to date.
-struct FittedFace {
-  const FaceFrame& frame;
-  TangentBasis basis;
-  WeingartenMap map;
-  double area;                 ///< mm²
-  NeighbourOffset offsets[3];  ///< Zero at the boundary.
+/// A face and its neighbours. Those at the boundary are the face itself and do not count.
+template <class T>
+struct FaceRing {
+  FaceFrameOf<T> frame;
+  T doubled_area{};
+  FaceFrameOf<T> there[3];
+  T edge_weights[3] = {};
+  bool inner[3] = {};
+};
 
-  LF_HD FittedFace(const ObjectiveView& o, std::int64_t i)
-      : frame(o.scratch.frames[i]), basis(frame.n) {
-    const double doubled_area = frame.n.dot(area_normal(o.corners(i)));  // |N|, without its root
-    area = 0.5 * doubled_area;
-    FaceFit fit;
+/// @pre frames are up to date.
+LF_HD inline FaceRing<double> face_ring(const ObjectiveView& o, std::int64_t i) {
+  FaceRing<double> ring;
+  ring.frame = o.scratch.frames[i];
+  ring.doubled_area = o.scratch.doubled_areas[i];
+  for (int k = 0; k < 3; ++k) {
+    const int j = o.mesh.neighbour(i, k);
+    ring.inner[k] = j >= 0;
+    if (j < 0) continue;
+    ring.there[k] = o.scratch.frames[j];
+    ring.edge_weights[k] = o.scratch.edge_weights[3 * i + k];
+  }
+  return ring;
+}
+
+/// A face with the map that minimises its F.
+template <class T>
+struct FittedFaceOf {
+  TangentBasisOf<T> basis;
+  WeingartenMapOf<T> map;
+  NeighbourOffsetOf<T> offsets[3];  ///< Zero at the boundary.
+
+  LF_HD LF_INLINE FittedFaceOf(const FaceRing<T>& ring, double edge_weight) : basis(ring.frame.n) {
+    FaceFitOf<T> fit;
     for (int k = 0; k < 3; ++k) {
-      const int j = o.mesh.neighbour(i, k);
-      if (j < 0) continue;
-      offsets[k] = NeighbourOffset(frame, basis, o.scratch.frames[j]);
-      fit.add(offsets[k], o.weights.edge * o.scratch.edge_weights[3 * i + k]);
+      if (!ring.inner[k]) continue;
+      offsets[k] = NeighbourOffsetOf<T>(ring.frame, basis, ring.there[k]);
+      fit.add(offsets[k], edge_weight * ring.edge_weights[k]);
     }
-    fit.add_mean_curvature(doubled_area);
+    fit.add_mean_curvature(ring.doubled_area);
     map = fit.solve();
+  }
+};
+
+/// Weighted derivatives of one face's F, and its shares of E_face and of Σ w h.
+template <class T>
+struct BentFace {
+  FaceFrameOf<T> by_neighbours[3];  ///< Zero at the boundary.
+  SpaceVector<T> by_tilt;
+  T by_area;
+  T curvature;
+  T edge{};
+
+  LF_HD LF_INLINE BentFace(const FaceRing<T>& ring, const ObjectiveWeights& weights) {
+    const FittedFaceOf<T> face(ring, weights.edge);
+    const T squared = face.map.mean_curvature() * face.map.mean_curvature();
+    curvature = squared * (0.5 * ring.doubled_area);
+    by_area = weights.smooth * squared;
+    PlaneVector<T> tilt{T{}, T{}};
+    for (int k = 0; k < 3; ++k) {
+      if (ring.inner[k]) add_neighbour(ring, face, k, weights.smooth * weights.edge, tilt);
+    }
+    by_tilt = face.basis.world(tilt);
+  }
+
+ private:
+  LF_HD LF_INLINE void add_neighbour(const FaceRing<T>& ring, const FittedFaceOf<T>& face, int k,
+                                     double weight, PlaneVector<T>& tilt) {
+    const FaceFrameOf<T>& there = ring.there[k];
+    const MismatchSlopeOf<T> slope(face.offsets[k], face.map);
+    const T scaled = weight * ring.edge_weights[k];
+    by_neighbours[k].n = scaled * face.basis.world(slope.by_n);
+    by_neighbours[k].c = scaled * face.basis.world(slope.by_d);
+    // A basis vector e tilts with the normal by −n (e·dn).
+    const SpaceVector<T>& n = ring.frame.n;
+    const SpaceVector<T> to_there = there.c - ring.frame.c;
+    const T along_d = scaled * n.dot(to_there);
+    const T along_n = scaled * n.dot(there.n);
+    tilt.x() -= along_d * slope.by_d.x() + along_n * slope.by_n.x();
+    tilt.y() -= along_d * slope.by_d.y() + along_n * slope.by_n.y();
+    edge += ring.edge_weights[k] * slope.value;
   }
 };
 
@@ -230,34 +320,28 @@ struct BendFace {
   ObjectiveView o;
 
   LF_HD std::array<double, 2> operator()(std::int64_t i) const {
-    const FittedFace face(o, i);
-    const Eigen::Vector3d& n = face.frame.n;
+    const FaceRing<double> ring = face_ring(o, i);
+    const BentFace<double> bent(ring, o.weights);
     FaceBend& bend = o.scratch.bends[i];
-    const ValueSlope curvature = mean_curvature_term(face.map, face.area);
-    bend.by_area = static_cast<float>(o.weights.smooth * curvature.slope);
-    Eigen::Vector2d tilt(0.0, 0.0);
-    double edge = 0.0;
+    bend.by_area = static_cast<float>(bent.by_area);
     for (int k = 0; k < 3; ++k) {
-      const int j = o.mesh.neighbour(i, k);
-      if (j < 0) continue;
-      const FaceFrame& there = o.scratch.frames[j];
-      const MismatchSlope slope(face.offsets[k], face.map);
-      const double w = o.scratch.edge_weights[3 * i + k];
-      const double scaled = o.weights.smooth * o.weights.edge * w;
-      const Eigen::Vector3d by_n = scaled * face.basis.world(slope.by_n);
-      const Eigen::Vector3d by_c = scaled * face.basis.world(slope.by_d);
-      bend.by_neighbours[k] = {by_n.cast<float>(), by_c.cast<float>()};
-      // A basis vector e tilts with the normal by −n (e·dn).
-      const double along_d = scaled * n.dot(there.c - face.frame.c);
-      const double along_n = scaled * n.dot(there.n);
-      tilt.x() -= along_d * slope.by_d.x() + along_n * slope.by_n.x();
-      tilt.y() -= along_d * slope.by_d.y() + along_n * slope.by_n.y();
-      edge += w * slope.value;
+      const FaceFrame& by = bent.by_neighbours[k];
+      if (ring.inner[k]) bend.by_neighbours[k] = {by.n.cast<float>(), by.c.cast<float>()};
     }
-    bend.by_tilt = face.basis.world(tilt).cast<float>();
-    return {curvature.value, edge};
+    bend.by_tilt = bent.by_tilt.cast<float>();
+    return {bent.curvature, bent.edge};
   }
 };
+
+/// The same for all faces on the CPU, several at a time: smoothness_batch.cpp.
+FinishedSum<2> bend_in_batches(const Executor& executor, const char* kernel, std::int64_t count,
+                               const BendFace& bend, Lanes lanes = widest_lanes());
+
+template <std::size_t N>
+FinishedSum<N> pending_sum(const Executor& executor, const char* kernel, std::int64_t count,
+                           const BendFace& bend) {
+  return bend_in_batches(executor, kernel, count, bend);
+}
 
 /// Derivatives of all faces' F by one face's frame and area. @pre bends are up to date.
 LF_HD inline FaceFrame bend_adjoint(const ObjectiveView& o, std::int64_t face, double& area_bar) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -10,6 +11,7 @@
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
 #include "core/optics/optical_setup.h"
+#include "design/flux/flux_batch.h"
 #include "design/flux/flux_triangle.h"
 
 namespace lensforge {
@@ -33,6 +35,26 @@ struct DepositFlux {
     deposit(source(i), {first.units + stride * worker, first.columns, first.rows});
   }
 };
+
+/// The same on the CPU, several triangles at a time.
+template <class Source>
+void parallel_for_worker(const Executor& executor, const char* kernel, std::int64_t count,
+                         const DepositFlux<Source>& deposit) {
+  executor.run(
+      kernel, count, kDefaultGrain,
+      [](const void* body, std::int64_t begin, std::int64_t end, int worker) {
+        const auto& d = *static_cast<const DepositFlux<Source>*>(body);
+        const FluxAccumulator image{d.first.units + d.stride * worker, d.first.columns,
+                                    d.first.rows};
+        TriangleBatch batch;
+        for (std::int64_t i = begin; i < end; i += TriangleBatch::kSize) {
+          const int size = static_cast<int>(std::min<std::int64_t>(TriangleBatch::kSize, end - i));
+          for (int k = 0; k < size; ++k) batch.set(k, d.source(i + k));
+          deposit_batch(batch, size, image);
+        }
+      },
+      &deposit);
+}
 
 /// Gives item i its worker's picture to deposit into.
 template <class Item>

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
+#include "design/flux/lanes.h"
 
 namespace lensforge {
 
@@ -211,10 +212,25 @@ namespace flux_detail {
 // as much as all the arithmetic of an edge.
 //
 // Notation: X and Y are the pixel borders that cross the triangle's box; a quadrant is one of the
-// four parts they cut the plane into. An edge runs a → b with parameter s.
+// four parts they cut the plane into. An edge runs a → b with parameter s. T is a double, or a
+// vector of doubles of several triangles (flux_batch.cpp), each with the same bits.
 
-LF_HD inline double least(double a, double b) { return a < b ? a : b; }
-LF_HD inline double most(double a, double b) { return a > b ? a : b; }
+template <class T>
+LF_HD LF_INLINE T least(const T& a, const T& b) {
+  return a < b ? a : b;
+}
+template <class T>
+LF_HD LF_INLINE T most(const T& a, const T& b) {
+  return a > b ? a : b;
+}
+
+/// Corners of a triangle, or derivatives by them.
+template <class T>
+struct PlaneTriangle {
+  PlaneVector<T> a;
+  PlaneVector<T> b;
+  PlaneVector<T> c;
+};
 
 /// Floor of a value that an int can hold. std::floor() is a library call on processors without an
 /// instruction for it.
@@ -260,92 +276,153 @@ struct PixelBox {
 };
 
 /// A number for each quadrant; "above" is the row of smaller y.
+template <class T>
 struct Quadrants {
-  double above_left = 0.0;
-  double above_right = 0.0;
-  double below_left = 0.0;
-  double below_right = 0.0;
+  T above_left{};
+  T above_right{};
+  T below_left{};
+  T below_right{};
 
-  [[nodiscard]] LF_HD double sum() const {
+  [[nodiscard]] LF_HD LF_INLINE T sum() const {
     return (above_left + above_right) + (below_left + below_right);
   }
-  [[nodiscard]] LF_HD double at(bool right, bool below) const {
-    const double above_value = right ? above_right : above_left;
-    const double below_value = right ? below_right : below_left;
+  template <class Mask>
+  [[nodiscard]] LF_HD LF_INLINE T at(const Mask& right, const Mask& below) const {
+    const T above_value = right ? above_right : above_left;
+    const T below_value = right ? below_right : below_left;
     return below ? below_value : above_value;
   }
 };
 
 /// Adds ∫ min(x, 0) dy and ∫ max(x, 0) dy along a straight piece of height dy whose x runs from u
 /// to v. The share of x's range on the right is exactly 0 or 1 where the piece does not cross.
-LF_HD inline void add_piece(double u, double v, double dy, double& left, double& right) {
-  const double u_right = most(u, 0.0);
-  const double v_right = most(v, 0.0);
-  const double range = u - v;
-  const double share = range == 0.0 ? (u > 0.0 ? 1.0 : 0.0) : (u_right - v_right) / range;
-  const double half = 0.5 * dy;
+template <class T>
+LF_HD LF_INLINE void add_piece(const T& u, const T& v, const T& dy, T& left, T& right) {
+  const T none{};
+  const T all = none + 1.0;
+  const T u_right = most(u, none);
+  const T v_right = most(v, none);
+  const T range = u - v;
+  const T crossing_share = (u_right - v_right) / range;
+  const T level_share = u > none ? all : none;
+  const T share = range == none ? level_share : crossing_share;
+  const T half = 0.5 * dy;
   right += half * (u_right + v_right) * share;
   left += half * ((u - u_right) + (v - v_right)) * (1.0 - share);
 }
 
 /// Adds an edge's part of ∮ x dy to every quadrant; over a closed polygon the sums are the signed
 /// areas. a and b are relative to the crossing of X and Y.
-LF_HD inline void add_edge(const Eigen::Vector2d& a, const Eigen::Vector2d& b, Quadrants& areas) {
-  const double a_above = least(a.y(), 0.0);
-  const double b_above = least(b.y(), 0.0);
-  const bool crosses = (a.y() < 0.0) != (b.y() < 0.0);
-  const double fall = crosses ? a.y() - b.y() : 1.0;
-  const double x = a.x() + (b.x() - a.x()) * (a.y() / fall);
-  const bool from_above = a.y() < 0.0;
-  const bool to_above = b.y() < 0.0;
-  add_piece(from_above ? a.x() : x, to_above ? b.x() : x, b_above - a_above, areas.above_left,
-            areas.above_right);
-  add_piece(from_above ? x : a.x(), to_above ? x : b.x(), (b.y() - b_above) - (a.y() - a_above),
-            areas.below_left, areas.below_right);
+template <class T>
+LF_HD LF_INLINE void add_edge(const PlaneVector<T>& a, const PlaneVector<T>& b,
+                              Quadrants<T>& areas) {
+  const T none{};
+  const T a_above = least(a.y(), none);
+  const T b_above = least(b.y(), none);
+  const auto from_above = a.y() < none;
+  const auto to_above = b.y() < none;
+  const auto crosses = from_above != to_above;
+  const T all = none + 1.0;
+  const T height = a.y() - b.y();
+  const T fall = crosses ? height : all;
+  const T x = a.x() + (b.x() - a.x()) * (a.y() / fall);
+  const T x_from_above = from_above ? a.x() : x;
+  const T x_to_above = to_above ? b.x() : x;
+  const T x_from_below = from_above ? x : a.x();
+  const T x_to_below = to_above ? x : b.x();
+  const T dy_above = b_above - a_above;
+  const T dy_below = (b.y() - b_above) - (a.y() - a_above);
+  add_piece(x_from_above, x_to_above, dy_above, areas.above_left, areas.above_right);
+  add_piece(x_from_below, x_to_below, dy_below, areas.below_left, areas.below_right);
 }
 
-/// Signed areas of a triangle's parts. @pre the triangle lies within the box's 2 × 2 pixels.
-LF_HD inline Quadrants quadrant_areas(const ImageTriangle& t, const Eigen::Vector2d& crossing) {
-  const Eigen::Vector2d a = t.p0 - crossing;
-  const Eigen::Vector2d b = t.p1 - crossing;
-  const Eigen::Vector2d c = t.p2 - crossing;
-  Quadrants areas;
-  add_edge(a, b, areas);
-  add_edge(b, c, areas);
-  add_edge(c, a, areas);
+/// Signed areas of a triangle's parts. @pre the triangle lies within 2 × 2 pixels.
+template <class T>
+LF_HD LF_INLINE Quadrants<T> quadrant_areas(const PlaneTriangle<T>& t) {
+  Quadrants<T> areas;
+  add_edge(t.a, t.b, areas);
+  add_edge(t.b, t.c, areas);
+  add_edge(t.c, t.a, areas);
   return areas;
 }
 
 /// Parameter at which a coordinate that runs from `from` to `to` changes sign; 1 if it does not. It
 /// always divides, because compilers keep a branch around a division.
-LF_HD inline double crossing_parameter(double from, double to) {
-  const bool crosses = (from < 0.0) != (to < 0.0);
-  const double share = from / (crosses ? from - to : 1.0);
-  return crosses ? share : 1.0;
+template <class T>
+LF_HD LF_INLINE T crossing_parameter(const T& from, const T& to) {
+  const T none{};
+  const T all = none + 1.0;
+  const auto crosses = (from < none) != (to < none);
+  const T change = from - to;
+  const T share = from / (crosses ? change : all);
+  return crosses ? share : all;
 }
 
 /// ∫ g (1 − s) ds and ∫ g s ds along an edge, g constant in every quadrant.
+template <class T>
 struct HatWeights {
-  double start;
-  double end;
+  T start;
+  T end;
 
-  LF_HD HatWeights(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Quadrants& g) {
-    const double sx = crossing_parameter(a.x(), b.x());
-    const double sy = crossing_parameter(a.y(), b.y());
-    const double s0 = least(sx, sy);
-    const double s1 = most(sx, sy);
-    const bool right_a = a.x() >= 0.0;
-    const bool right_b = b.x() >= 0.0;
-    const bool below_a = a.y() >= 0.0;
-    const bool below_b = b.y() >= 0.0;
-    const double first = g.at(right_a, below_a);
-    const double middle = sx < sy ? g.at(right_b, below_a) : g.at(right_a, below_b);
-    const double last = g.at(right_b, below_b);
-    const double whole = first * s0 + middle * (s1 - s0) + last * (1.0 - s1);
+  LF_HD LF_INLINE HatWeights(const PlaneVector<T>& a, const PlaneVector<T>& b,
+                             const Quadrants<T>& g) {
+    const T none{};
+    const T sx = crossing_parameter(a.x(), b.x());
+    const T sy = crossing_parameter(a.y(), b.y());
+    const T s0 = least(sx, sy);
+    const T s1 = most(sx, sy);
+    const auto right_a = a.x() >= none;
+    const auto right_b = b.x() >= none;
+    const auto below_a = a.y() >= none;
+    const auto below_b = b.y() >= none;
+    const T first = g.at(right_a, below_a);
+    const T after_x = g.at(right_b, below_a);
+    const T after_y = g.at(right_a, below_b);
+    const T middle = sx < sy ? after_x : after_y;
+    const T last = g.at(right_b, below_b);
+    const T whole = first * s0 + middle * (s1 - s0) + last * (1.0 - s1);
     end = 0.5 * (first * s0 * s0 + middle * (s1 - s0) * (s1 + s0) + last * (1.0 - s1) * (1.0 + s1));
     start = whole - end;
   }
 };
+
+/// Adds to a_bar and b_bar the derivatives of ∫ g by the ends of the edge a → b.
+template <class T>
+LF_HD LF_INLINE void add_swept(const PlaneVector<T>& a, const PlaneVector<T>& b,
+                               const HatWeights<T>& weights, PlaneVector<T>& a_bar,
+                               PlaneVector<T>& b_bar) {
+  const PlaneVector<T> normal{b.y() - a.y(), a.x() - b.x()};
+  a_bar += weights.start * normal;
+  b_bar += weights.end * normal;
+}
+
+/// G = ∫ g over a triangle and its derivatives by the corners. g does not change under scaling
+/// about the crossing of the pixel borders, so G is homogeneous of degree two and follows from its
+/// derivatives by Euler's theorem.
+template <class T>
+LF_HD LF_INLINE T gather_small(const PlaneTriangle<T>& t, const Quadrants<T>& g,
+                               PlaneTriangle<T>& bar) {
+  add_swept(t.a, t.b, HatWeights<T>(t.a, t.b, g), bar.a, bar.b);
+  add_swept(t.b, t.c, HatWeights<T>(t.b, t.c, g), bar.b, bar.c);
+  add_swept(t.c, t.a, HatWeights<T>(t.c, t.a, g), bar.c, bar.a);
+  return 0.5 * (t.a.dot(bar.a) + t.b.dot(bar.b) + t.c.dot(bar.c));
+}
+
+/// Turns the derivatives of G by the corners into those of E = Φ G / A, which is dE = (G/A) dΦ +
+/// (Φ/A)(dG − (G/A) dA); returns ∂E/∂Φ. @param doubled  2 A. @param integral  G.
+template <class T>
+LF_HD LF_INLINE T mean_adjoint(const PlaneTriangle<T>& t, const T& doubled, const T& flux,
+                               const T& integral, PlaneTriangle<T>& bar) {
+  const T inverse_area = 2.0 / doubled;
+  const T mean = integral * inverse_area;
+  const T density = flux * inverse_area;
+  const T scale = -0.5 * mean;
+  bar.a += scale * PlaneVector<T>{t.b.y() - t.c.y(), t.c.x() - t.b.x()};
+  bar.b += scale * PlaneVector<T>{t.c.y() - t.a.y(), t.a.x() - t.c.x()};
+  bar.c += scale * PlaneVector<T>{t.a.y() - t.b.y(), t.b.x() - t.a.x()};
+  bar = {density * bar.a, density * bar.b, density * bar.c};
+  return mean;
+}
 
 }  // namespace flux_detail
 
@@ -428,11 +505,16 @@ LF_HD inline std::int64_t to_units(double flux) {
   return static_cast<std::int64_t>(std::llrint(flux * kFluxUnits));
 }
 
+LF_HD inline PlaneTriangle<double> plane_triangle(const ImageTriangle& t,
+                                                  const Eigen::Vector2d& crossing) {
+  return {t.p0 - crossing, t.p1 - crossing, t.p2 - crossing};
+}
+
 /// Deposit of a triangle that touches at most 2 × 2 pixels. Untouched pixels get exactly nothing.
 /// No density is used, so a triangle may be arbitrarily small.
 LF_HD inline void deposit_small(const ImageTriangle& t, const PixelBox& box,
                                 const FluxAccumulator& image) {
-  const Quadrants areas = quadrant_areas(t, box.crossing());
+  const Quadrants<double> areas = quadrant_areas(plane_triangle(t, box.crossing()));
   const double density = t.flux / areas.sum();
   const std::int64_t above_left = to_units(density * areas.above_left);
   const std::int64_t above_right = to_units(density * areas.above_right);
@@ -580,57 +662,30 @@ struct GatherEdge {
   }
 
   /// Walks p → q and adds ∂G/∂p and ∂G/∂q.
-  LF_HD void edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, Eigen::Vector2d& p_bar,
-                  Eigen::Vector2d& q_bar) {
+  LF_HD void edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q, PlaneVector<double>& p_bar,
+                  PlaneVector<double>& q_bar) {
     weight_p = weight_q = 0.0;
     walk_edge(p, q, cotangent.columns, cotangent.rows, *this);
-    const Eigen::Vector2d normal(q.y() - p.y(), p.x() - q.x());
+    const PlaneVector<double> normal{q.y() - p.y(), p.x() - q.x()};
     p_bar += weight_p * normal;
     q_bar += weight_q * normal;
   }
 };
 
-/// Adds to p_bar and q_bar the derivatives of G by the ends of the edge p → q.
-LF_HD inline void add_swept(const Eigen::Vector2d& p, const Eigen::Vector2d& q,
-                            const HatWeights& weights, Eigen::Vector2d& p_bar,
-                            Eigen::Vector2d& q_bar) {
-  const Eigen::Vector2d normal(q.y() - p.y(), p.x() - q.x());
-  p_bar += weights.start * normal;
-  q_bar += weights.end * normal;
-}
-
-/// G and its derivatives by the corners for a triangle within 2 × 2 pixels. g does not change under
-/// scaling about the crossing of the pixel borders, so G is homogeneous of degree two and follows
-/// from its derivatives by Euler's theorem.
-LF_HD inline double gather_small(const ImageTriangle& t, const PixelBox& box,
-                                 const FluxCotangent& cotangent, ImageTriangle& bar) {
-  const Eigen::Vector2d crossing = box.crossing();
-  const Quadrants g{cotangent.at(box.r1 - 1, box.c1 - 1), cotangent.at(box.r1 - 1, box.c1),
-                    cotangent.at(box.r1, box.c1 - 1), cotangent.at(box.r1, box.c1)};
-  const Eigen::Vector2d a = t.p0 - crossing;
-  const Eigen::Vector2d b = t.p1 - crossing;
-  const Eigen::Vector2d c = t.p2 - crossing;
-  add_swept(a, b, HatWeights(a, b, g), bar.p0, bar.p1);
-  add_swept(b, c, HatWeights(b, c, g), bar.p1, bar.p2);
-  add_swept(c, a, HatWeights(c, a, g), bar.p2, bar.p0);
-  return 0.5 * (a.dot(bar.p0) + b.dot(bar.p1) + c.dot(bar.p2));
+/// g in the pixels of a box of at most 2 × 2.
+LF_HD inline Quadrants<double> quadrants_of(const PixelBox& box, const FluxCotangent& cotangent) {
+  return {cotangent.at(box.r1 - 1, box.c1 - 1), cotangent.at(box.r1 - 1, box.c1),
+          cotangent.at(box.r1, box.c1 - 1), cotangent.at(box.r1, box.c1)};
 }
 
 /// G and its derivatives by the corners for any triangle.
 LF_HD inline double gather_large(const ImageTriangle& t, const FluxCotangent& cotangent,
-                                 ImageTriangle& bar) {
+                                 PlaneTriangle<double>& bar) {
   GatherEdge gather{cotangent};
-  gather.edge(t.p0, t.p1, bar.p0, bar.p1);
-  gather.edge(t.p1, t.p2, bar.p1, bar.p2);
-  gather.edge(t.p2, t.p0, bar.p2, bar.p0);
+  gather.edge(t.p0, t.p1, bar.a, bar.b);
+  gather.edge(t.p1, t.p2, bar.b, bar.c);
+  gather.edge(t.p2, t.p0, bar.c, bar.a);
   return gather.integral;
-}
-
-/// Adds scale × ∂(doubled signed area)/∂corners.
-LF_HD inline void doubled_area_adjoint(const ImageTriangle& t, double scale, ImageTriangle& bar) {
-  bar.p0 += scale * Eigen::Vector2d(t.p1.y() - t.p2.y(), t.p2.x() - t.p1.x());
-  bar.p1 += scale * Eigen::Vector2d(t.p2.y() - t.p0.y(), t.p0.x() - t.p2.x());
-  bar.p2 += scale * Eigen::Vector2d(t.p0.y() - t.p1.y(), t.p1.x() - t.p0.x());
 }
 
 }  // namespace flux_detail
@@ -656,17 +711,15 @@ LF_HD inline ImageTriangle deposit_adjoint(const ImageTriangle& t, const FluxCot
         [&](int row, int column, double share) { bar.flux += share * cotangent.at(row, column); });
     return bar;
   }
-  const double integral = small ? detail::gather_small(t, box, cotangent, bar)
-                                : detail::gather_large(t, cotangent, bar);
-  // E = Φ G / A, so dE = (G/A) dΦ + (Φ/A)(dG − (G/A) dA).
-  const double inverse_area = 2.0 / doubled;
-  const double mean = integral * inverse_area;
-  const double density = t.flux * inverse_area;
-  detail::doubled_area_adjoint(t, -0.5 * mean, bar);
-  bar.p0 *= density;
-  bar.p1 *= density;
-  bar.p2 *= density;
-  bar.flux = mean;
+  detail::PlaneTriangle<double> bars{{0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}};
+  const double integral = small ? detail::gather_small(detail::plane_triangle(t, box.crossing()),
+                                                       detail::quadrants_of(box, cotangent), bars)
+                                : detail::gather_large(t, cotangent, bars);
+  const detail::PlaneTriangle<double> corners{t.p0, t.p1, t.p2};
+  bar.flux = detail::mean_adjoint(corners, doubled, t.flux, integral, bars);
+  bar.p0 = bars.a;
+  bar.p1 = bars.b;
+  bar.p2 = bars.c;
   return bar;
 }
 

@@ -5,7 +5,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -359,6 +362,52 @@ TEST(Objective, ACreaseCostsItsEdgesAndNoMore) {
   const EnergyValues e = evaluate_at(objective, mesh.vertices).energy;
   EXPECT_NEAR(e.edge, kShape.columns - 1, 1e-3);
   EXPECT_NEAR(e.face, 0.0, 1e-3);
+}
+
+TEST(BendFace, SeveralAtATimeHaveTheBitsOfSingleFaces) {
+  const Executor executor = Executor::serial();
+  const SurfaceMesh mesh = rough_mesh();
+  const MeshOn<Executor> arrays(mesh, make_topology(mesh), executor);
+  const auto faces = static_cast<std::size_t>(mesh.triangle_count());
+  std::vector<FaceFrame> frames(faces);
+  std::vector<double> doubled_areas(faces);
+  std::vector<double> edge_weights(3 * faces);
+  std::vector<FaceBend> bends(faces);
+  Random random(8);
+  for (std::size_t i = 0; i < faces; ++i) {
+    const Corners t = mesh.corners(static_cast<std::int64_t>(i));
+    frames[i] = face_frame(t);
+    doubled_areas[i] = area_normal(t).norm();
+  }
+  for (double& weight : edge_weights) weight = random.between(0.0, 200.0);
+  const BendFace bend{{.weights = {},
+                       .nu = 0.05,
+                       .area = {},
+                       .light = LightPath(kSetup),
+                       .vertices = mesh.vertices.data(),
+                       .incident = {},
+                       .mesh = arrays.view(),
+                       .goal = {},
+                       .scratch = {frames.data(), doubled_areas.data(), nullptr, bends.data(),
+                                   edge_weights.data(), nullptr, nullptr},
+                       .aperture = {}}};
+  const std::array<double, 2> sum =
+      parallel_sum<2>(executor, "bend faces", mesh.triangle_count(), bend);
+  const std::vector<FaceBend> expected = bends;
+  for (const Lanes lanes : {Lanes::kTwo, widest_lanes()}) {
+    for (FaceBend& each : bends) each.by_area = -1.0F;
+    EXPECT_EQ(bend_in_batches(executor, "bend faces", mesh.triangle_count(), bend, lanes).get(),
+              sum);
+    for (std::size_t i = 0; i < faces; ++i) {
+      ASSERT_EQ(bends[i].by_area, expected[i].by_area);
+      ASSERT_EQ(bends[i].by_tilt, expected[i].by_tilt);
+      for (int k = 0; k < 3; ++k) {
+        if (arrays.view().neighbour(static_cast<std::int64_t>(i), k) < 0) continue;
+        ASSERT_EQ(bends[i].by_neighbours[k].n, expected[i].by_neighbours[k].n);
+        ASSERT_EQ(bends[i].by_neighbours[k].c, expected[i].by_neighbours[k].c);
+      }
+    }
+  }
 }
 
 const Eigen::Vector2d kPlate(12.0, 10.0);
