@@ -46,8 +46,8 @@ inline constexpr int kFewestMarks = 2;
 
 /// Finds the marks of a chart that are in sight, in whatever light the wall has: dark
 /// quadrilaterals on a brighter ground whose cells are those of a mark. Corners are those of lines
-/// through their sides. A mirrored chart is not one. Marks as wide as 2 % of the longer side are
-/// found, if they have 20 pixels. @return none if no mark is in sight, or more than one in no
+/// through their sides. A mirrored chart is not one. Marks need 25 pixels, and 2 % of the longer
+/// side. @return none if no mark is in sight, or more than one in no
 /// common perspective.
 /// @param name  of the photograph. @throw InputError if a mark is in it twice.
 std::optional<SeenChart> find_chart(const Image& light, const std::string& name);
