@@ -2,16 +2,19 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
 #include "app/frame/option_set.h"
+#include "cam/check/chart.h"
 #include "cam/check/check_job.h"
 #include "cam/check/wall_view.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/io/files.h"
 #include "core/lens/lens.h"
 #include "core/schema/toml.h"
 #include "core/text/words.h"
@@ -30,16 +33,17 @@ struct CheckSettings {
   std::string workshop;
   std::string workshop_text;
   std::string fit;
+  std::string chart;
+  double chart_bar = kChartBar;
   bool force = false;
   CamOptions cam;
 };
 
 void describe(Description& d, CheckSettings& settings) {
-  d.text("LENS", settings.source, "", "lens folder").needed = true;
+  d.text("LENS", settings.source, "", "lens folder");
   d.texts("PHOTO", settings.photos, "",
-          "photograph of the wall; several of the same view with different exposures count as one")
-      .needed = true;
-  d.text("--out", settings.out, "DIR", "folder for report, pictures and check.json").needed = true;
+          "photograph of the wall; several of the same view with different exposures count as one");
+  d.text("--out", settings.out, "DIR", "folder for report, pictures and check.json");
   d.text("--dark", settings.dark, "PHOTO",
          "the same view and exposure with the lamp off: the room's light, which is subtracted");
   d.text("--workshop", settings.workshop, "FILE.toml",
@@ -47,11 +51,26 @@ void describe(Description& d, CheckSettings& settings) {
   d.text("--fit", settings.fit, "FILE.toml",
          "write the workshop with what the photograph tells of it, polish.sigma or "
          "finish.pitch_error, for design --made-by and cam --workshop");
+  d.text("--chart", settings.chart, "FILE.svg",
+         "write a chart to print and fasten on the wall beside the picture, and check nothing; a "
+         "photograph that shows it gives perspective and size for certain");
+  d.length("--chart-bar", settings.chart_bar, Limits::between(1.0, 1000.0),
+           "length of the chart's scale bar: to draw, or as measured on the print");
   d.flag("--force", settings.force, "replace files that lensforge did not write");
 }
 
-Photograph read_photo(const std::string& file, const Image& dark, CommandFrame& frame) {
-  return photograph(read_image(file, frame.control()).image, dark, file);
+/// With its chart, which the photograph with the lamp off may show as well.
+Photograph read_photo(const std::string& file, const Image& dark, const CheckSettings& settings,
+                      CommandFrame& frame) {
+  Image light = read_image(file, frame.control()).image;
+  std::optional<SeenChart> chart = find_chart(light, file);
+  if (!dark.empty() && (!chart || chart->marks() < kFewestMarks)) {
+    chart = find_chart(dark, settings.dark);
+  }
+  if (chart) chart->bar = settings.chart_bar;
+  Photograph photo = photograph(std::move(light), dark, file);
+  photo.chart = std::move(chart);
+  return photo;
 }
 
 /// @throw InputError as bracketed().
@@ -62,15 +81,18 @@ Photograph read_photos(const CheckSettings& settings, CommandFrame& frame) {
   }
   Image dark;
   if (!settings.dark.empty()) dark = read_image(settings.dark, frame.control()).image;
-  if (settings.photos.size() == 1) return read_photo(settings.photos.front(), dark, frame);
+  if (settings.photos.size() == 1) {
+    return read_photo(settings.photos.front(), dark, settings, frame);
+  }
   std::vector<Photograph> exposures;
   for (const std::string& file : settings.photos) {
-    exposures.push_back(read_photo(file, {}, frame));
+    exposures.push_back(read_photo(file, {}, settings, frame));
   }
   return bracketed(exposures);
 }
 
-std::vector<std::string> warnings_of(const Lens& lens, const CheckResult& result) {
+std::vector<std::string> warnings_of(const Lens& lens, const Photograph& photo,
+                                     const CheckResult& result) {
   constexpr double kFewest = 1.5;
   std::vector<std::string> warnings;
   if (!result.part) {
@@ -81,6 +103,10 @@ std::vector<std::string> warnings_of(const Lens& lens, const CheckResult& result
     warnings.push_back("the photograph has " + fixed(pixels, 1) +
                        " pixels per pixel of the picture, 1.5 or more tell causes better; go "
                        "nearer");
+  }
+  if (photo.chart && !result.chart) {
+    warnings.push_back(photo.name + ": shows one mark of a chart, must show " +
+                       std::to_string(kFewestMarks) + " or more; checked without it");
   }
   return warnings;
 }
@@ -125,7 +151,37 @@ std::vector<std::string> notes_of(const CheckSettings& settings, const NextLens&
   return notes;
 }
 
+/// @throw InputError if the file must not be replaced, or what a check needs is given.
+CommandResult write_chart(CommandFrame& frame, const CheckSettings& settings) {
+  if (!settings.source.empty()) {
+    throw InputError("LENS " + settings.source + ": --chart writes a chart and checks nothing");
+  }
+  require_replaceable("--chart", settings.chart, settings.force);
+  frame.begin_file(settings.chart);
+  const std::string drawing = chart_drawing(settings.chart_bar);
+  frame.begin_writing();
+  write_whole_file(settings.chart, drawing);
+  const nlohmann::json json = {{"status", "done"},
+                               {"options", frame.options().used()},
+                               {"files", files_json({settings.chart})}};
+  return {json,
+          "",
+          kDone,
+          {},
+          {"print " + settings.chart +
+           " without scaling, measure its bar, and photograph it on the wall beside the picture"}};
+}
+
+/// @throw InputError
+void require_given(const char* name, bool given) {
+  if (!given) throw InputError(std::string(name) + ": is missing; see lensforge check --help");
+}
+
 CommandResult run(CommandFrame& frame, CheckSettings& settings) {
+  if (!settings.chart.empty()) return write_chart(frame, settings);
+  require_given("LENS", !settings.source.empty());
+  require_given("PHOTO", !settings.photos.empty());
+  require_given("--out", !settings.out.empty());
   read_shop(settings);
   const Lens lens = read_lens(settings.source);
   validate(settings.cam, lens.setup);
@@ -137,7 +193,7 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   const Photograph photo = read_photos(settings, frame);
   const CheckResult result =
       check_photograph(lens, settings.cam, photo, frame.executor(), frame.control());
-  std::vector<std::string> warnings = warnings_of(lens, result);
+  std::vector<std::string> warnings = warnings_of(lens, photo, result);
   std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
   write_fit(settings, result.next, files, warnings);
   nlohmann::json json = check_json(result, lens, settings.cam);

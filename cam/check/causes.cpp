@@ -31,11 +31,11 @@ constexpr int kMostRounds = 6;
 /// Steps shorter than this share of deviation_steps() end a fit.
 constexpr double kShortStep = 0.02;
 
-Image sum_of(const Image& image, double factor, const Image& other) {
-  Image sum = image;
-  for (std::size_t i = 0; i < sum.values().size(); ++i) {
-    sum.values()[i] += static_cast<float>(factor) * other.values()[i];
+WallPicture sum_of(WallPicture sum, double factor, const WallPicture& other) {
+  for (std::size_t i = 0; i < sum.light.values().size(); ++i) {
+    sum.light.values()[i] += static_cast<float>(factor) * other.light.values()[i];
   }
+  sum.log_size += factor * other.log_size;
   return sum;
 }
 
@@ -91,12 +91,12 @@ class DeviationFit {
     return wall_picture(*model_, at);
   }
   /// Change of the picture by one step.
-  [[nodiscard]] Image change(Deviation deviation, const Image& from) const;
+  [[nodiscard]] WallPicture change(Deviation deviation, const WallPicture& from) const;
 
   /// Pictures by the view and steps of active deviations, in that order: linear in these.
   struct Line {
     WallPicture base;
-    std::vector<Image> changes;
+    std::vector<WallPicture> changes;
 
     [[nodiscard]] WallPicture at(const Eigen::VectorXd& parameters) const;
   };
@@ -115,7 +115,7 @@ class DeviationFit {
   double square_ = 0.0;
 };
 
-Image DeviationFit::change(Deviation deviation, const Image& from) const {
+WallPicture DeviationFit::change(Deviation deviation, const WallPicture& from) const {
   const Eigen::Index i = index_of(deviation);
   Deviations moved = at_;
   // Scallops show below the planned polish, and ever faster: from there its step is towards them.
@@ -123,16 +123,15 @@ Image DeviationFit::change(Deviation deviation, const Image& from) const {
       deviation == Deviation::kPolish && at_[i] < 0.0 && at_[i] - steps_[i] > limits_.least[i];
   const double way = to_scallops || at_[i] + steps_[i] > limits_.most[i] ? -1.0 : 1.0;
   moved[i] += way * steps_[i];
-  Image change = sum_of(wall(moved).light, -1.0, from);
-  for (float& value : change.values()) value *= static_cast<float>(way);
-  return change;
+  const WallPicture there = wall(moved);
+  return way > 0.0 ? sum_of(there, -1.0, from) : sum_of(from, -1.0, there);
 }
 
 WallPicture DeviationFit::Line::at(const Eigen::VectorXd& parameters) const {
   WallPicture picture = base;
   for (std::size_t k = 0; k < changes.size(); ++k) {
     const double by = parameters[view::kCount + static_cast<Eigen::Index>(k)];
-    if (by != 0.0) picture.light = sum_of(picture.light, by, changes[k]);
+    if (by != 0.0) picture = sum_of(std::move(picture), by, changes[k]);
   }
   return picture;
 }
@@ -155,7 +154,7 @@ LeastSquares DeviationFit::problem(const Line& line) const {
     Eigen::MatrixXd rows = pixels_->derivatives(view, now);
     rows.conservativeResize(Eigen::NoChange, count);
     for (std::size_t k = 0; k < line.changes.size(); ++k) {
-      const WallPicture beyond{sum_of(now.light, kStep, line.changes[k]), now.margin};
+      const WallPicture beyond = sum_of(now, kStep, line.changes[k]);
       rows.col(view::kCount + static_cast<Eigen::Index>(k)) =
           (pixels_->shown(view, beyond) - shown) / kStep;
     }
@@ -180,7 +179,7 @@ double DeviationFit::take(const Eigen::VectorXd& parameters) {
 void DeviationFit::run() {
   for (int round = 0; round < kMostRounds; ++round) {
     Line line{wall(at_), {}};
-    for (const Deviation d : active_) line.changes.push_back(change(d, line.base.light));
+    for (const Deviation d : active_) line.changes.push_back(change(d, line.base));
     Eigen::VectorXd start = Eigen::VectorXd::Zero(view::kCount + std::ssize(active_));
     start.head(view::kCount) = view_;
     if (take(minimize(problem(line), start)) < kShortStep) break;
@@ -196,7 +195,7 @@ DeviationFit::Tangents DeviationFit::tangents() const {
   for (std::size_t k = 0; k < kDeviations; ++k) {
     const auto d = static_cast<Deviation>(k);
     if (!model_->shows(d)) continue;
-    const WallPicture moved{sum_of(base.light, 1.0, change(d, base.light)), base.margin};
+    const WallPicture moved = sum_of(base, 1.0, change(d, base));
     result.columns.col(static_cast<Eigen::Index>(k)) = pixels_->shown(view_, moved) - shown;
   }
   return result;
@@ -240,11 +239,12 @@ bool scales_throw(Deviation deviation) {
          deviation == Deviation::kIndex;
 }
 
-/// Deviations that are named: those that a table of photographs on a virtual wall proves
+/// Deviations that are named: those that tables of photographs on a virtual wall prove
 /// (docs/check.md). The others may stand in their place, or be measured.
-bool may_be_named(Deviation deviation) {
+/// @param chart  the picture's size is known.
+bool may_be_named(Deviation deviation, bool chart) {
   return deviation != Deviation::kBall && deviation != Deviation::kIndex &&
-         deviation != Deviation::kLampDistance;
+         (deviation != Deviation::kLampDistance || chart);
 }
 
 /// Compares all sets of causes at once, linear around a fit, with the view free.
@@ -256,7 +256,8 @@ bool may_be_named(Deviation deviation) {
 /// a pixel times τ: N pixels hold N / τ independent values, by what all deviations together leave.
 class JointTest {
  public:
-  explicit JointTest(const DeviationFit& fit) : steps_(fit.steps()), limits_(fit.limits()) {
+  explicit JointTest(const DeviationFit& fit)
+      : steps_(fit.steps()), limits_(fit.limits()), chart_(fit.pixels().tie().has_value()) {
     const Deviations own = model_error(steps_).cwiseQuotient(steps_);
     const Deviations prior = prior_of(steps_).cwiseQuotient(steps_);
     own_ = own.cwiseAbs2();
@@ -300,7 +301,8 @@ class JointTest {
   /// Sets of at most `most` causes with evidence, the most of it first, kTried of them.
   [[nodiscard]] std::vector<std::vector<Deviation>> best(int most) const {
     std::vector<Deviation> candidates;
-    std::copy_if(showing_.begin(), showing_.end(), std::back_inserter(candidates), may_be_named);
+    std::copy_if(showing_.begin(), showing_.end(), std::back_inserter(candidates),
+                 [&](Deviation d) { return may_be_named(d, chart_); });
     std::vector<std::pair<double, std::vector<Deviation>>> sets;
     for (unsigned mask = 1; mask < 1U << candidates.size(); ++mask) {
       if (std::popcount(mask) > most) continue;
@@ -352,18 +354,20 @@ class JointTest {
     return result;
   }
 
-  /// True if values, in steps, are within limits, and one cause at most scales the throw.
+  /// True if values, in steps, are within limits, and one cause at most scales the throw; with a
+  /// chart, two may: a lamp's distance also changes the picture's size.
   [[nodiscard]] bool named(const std::vector<Deviation>& causes, const Deviations& values) const {
     for (const Deviation d : causes) {
       const double value = values[index_of(d)] * steps_[index_of(d)];
       if (value > limits_.most[index_of(d)] || value < limits_.least[index_of(d)]) return false;
     }
-    return std::count_if(causes.begin(), causes.end(), scales_throw) <= 1;
+    return std::count_if(causes.begin(), causes.end(), scales_throw) <= (chart_ ? 2 : 1);
   }
 
   Deviations steps_;
   Deviations own_, prior_;  ///< Variances of model_error() and prior_of(), in steps.
   DeviationLimits limits_;
+  bool chart_;
   Eigen::MatrixXd products_;
   Deviations along_;
   double square_ = 0.0;    ///< |r|²
@@ -407,7 +411,7 @@ void describe_all(const DeviationFit& fit, const JointTest& test, CauseFit& resu
 }  // namespace
 
 WallPicture wall_picture(const WallModel& model, const Deviations& deviations) {
-  return {model.picture(deviations), model.margin() * model.fine()};
+  return {model.picture(deviations), model.margin() * model.fine(), model.log_size(deviations)};
 }
 
 namespace {
@@ -466,8 +470,13 @@ TestedFit search(const TestedFit& from, int most) {
 
 CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
                      const RunControl& control) {
-  DeviationFit none(model, pixels, view, control);
+  SeenPixels tied = pixels;
+  DeviationFit none(model, tied, view, control);
   none.run();
+  if (tied.tie()) {
+    tied.trust_bar(std::sqrt(JointTest(none).variance()));
+    none.run();
+  }
   CauseFit result;
   result.unexplained = std::sqrt(none.square() / none.samples());
   TestedFit best(std::move(none));

@@ -157,10 +157,47 @@ bool is_name_of_check(const std::string& name) {
   return std::find(kCheckFiles.begin(), kCheckFiles.end(), name) != kCheckFiles.end();
 }
 
-CheckResult check_photograph(const Lens& lens, const CamOptions& options, const Photograph& photo,
-                             const Executor& own_executor, const RunControl& control) {
+namespace {
+
+/// The photograph with a chart of this lens's picture, without the chart's light; or with none
+/// where too few marks are in sight.
+Photograph with_chart(const Photograph& photo, const Lens& lens) {
+  Photograph wall = photo;
+  if (!wall.chart) return wall;
+  wall.chart->picture = lens.setup.image_size;
+  wall = without_chart(std::move(wall));
+  if (wall.chart->marks() < kFewestMarks) wall.chart.reset();
+  return wall;
+}
+
+/// How wide the picture is by the chart: as planned over the view's scale, with the errors of view,
+/// corners and bar. The view's own pixels fix it hundreds of times better than the bar does.
+/// @pre pixels has a tie
+ChartFinding chart_finding(const SeenPixels& pixels, const WallPicture& picture,
+                           const Eigen::VectorXd& view, double planned) {
+  const ChartTie& tie = *pixels.tie();
+  const Eigen::VectorXd rest = pixels.shown(view, picture) - pixels.seen();
+  const double variance =
+      rest.squaredNorm() / static_cast<double>(pixels.size()) * pixels.values_alike(rest);
+  const Eigen::MatrixXd slopes = pixels.derivatives(view, picture);
+  const Eigen::VectorXd of_scale = kBarError * tie.derivatives(view).bottomRows(1).transpose();
+  const Eigen::MatrixXd products = slopes.transpose() * slopes;
+  const double share = variance * of_scale.dot(products.ldlt().solve(of_scale));
+  ChartFinding finding;
+  finding.marks = static_cast<int>(tie.size() / 8);
+  finding.width = planned / tie.scale(view);
+  finding.error = finding.width * std::hypot(std::sqrt(std::max(share, 0.0)), kBarError);
+  return finding;
+}
+
+}  // namespace
+
+CheckResult check_photograph(const Lens& lens, const CamOptions& options,
+                             const Photograph& as_taken, const Executor& own_executor,
+                             const RunControl& control) {
   const Executor executor = own_executor.with_stop(control.stop_token());
-  require_light(photo);  // Before the rows are planned, which takes long.
+  require_light(as_taken);  // Before the rows are planned, which takes long.
+  const Photograph photo = with_chart(as_taken, lens);
   const WallModel model(lens, options, kFine, executor, control);
   control.report({"check", 0.0, 0.0, "predicting the picture"});
   const WallPicture forecast = wall_picture(model, Deviations::Zero());
@@ -172,7 +209,12 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options, const 
   result.seen_pixels = pixels_across(photo, found);
   const Photograph less =
       shrunk(photo, result.seen_pixels / (kSeenPerPixel * lens.setup.pixels.x()));
-  result.fit = find_causes(model, SeenPixels(less, found, kCompared), found, control);
+  const SeenPixels pixels(less, found, kCompared);
+  result.fit = find_causes(model, pixels, found, control);
+  if (pixels.tie()) {
+    result.chart = chart_finding(pixels, wall_picture(model, result.fit.deviations),
+                                 result.fit.view, lens.setup.image_size.x());
+  }
   result.next = next_lens(result.fit, lens, options);
   result.rectified = rectified(less, result.fit.view, lens.target);
   result.unusable = clipped_share(photo, result.fit.view, lens.target);
@@ -342,12 +384,18 @@ std::string capital(std::string words) {
 
 }  // namespace
 
+std::string words_of(const ChartFinding& chart, const Lens& lens) {
+  return "by the chart the picture is " + plus_minus(chart.width, chart.error, " mm") +
+         " wide, planned " + number_text(lens.setup.image_size.x()) + " mm";
+}
+
 std::string verdict_of(const CheckResult& result, const Lens& lens, const CamOptions& options) {
+  const std::string chart = result.chart ? "; " + words_of(*result.chart, lens) : "";
   if (result.fit.found.empty()) {
-    return "Nothing is wrong that shows in this photograph";
+    return "Nothing is wrong that shows in this photograph" + chart;
   }
   const FoundCause& first = result.fit.found.front();
-  return "Likeliest: " + words_of(first, lens, options) + alternatives_words(first);
+  return "Likeliest: " + words_of(first, lens, options) + alternatives_words(first) + chart;
 }
 
 namespace {
@@ -391,6 +439,15 @@ nlohmann::json all_json(const CheckResult& result, const Lens& lens, const CamOp
   return json;
 }
 
+/// Null without a chart.
+nlohmann::json chart_json(const CheckResult& result, const Lens& lens) {
+  if (!result.chart) return nullptr;
+  return {{"marks", result.chart->marks},
+          {"picture_width_mm", result.chart->width},
+          {"uncertainty", result.chart->error},
+          {"planned", lens.setup.image_size.x()}};
+}
+
 /// What the next lens should know.
 nlohmann::json next_json(const NextLens& next) {
   nlohmann::json json = {{"workshop", nlohmann::json::object()},
@@ -415,6 +472,7 @@ nlohmann::json check_json(const CheckResult& result, const Lens& lens, const Cam
           {"verdict", verdict_of(result, lens, options)},
           {"causes", causes},
           {"measured", all_json(result, lens, options)},
+          {"chart", chart_json(result, lens)},
           {"next", next_json(result.next)},
           {"forecast_of", result.part ? "part" : "design"},
           {"residual", result.fit.residual},
@@ -468,7 +526,9 @@ std::string measured_table(const CheckResult& result, const Lens& lens, const Ca
   return html_table(columns, rows) +
          element("p", "",
                  "Each as if nothing but it and the causes above were other than planned. The "
-                 "wall's distance, the lamp's and the index change a picture alike.");
+                 "wall's distance" +
+                     std::string(result.chart ? "" : ", the lamp's") +
+                     " and the index change a picture alike.");
 }
 
 std::string report_page(const CheckResult& result, const Lens& lens, const CamOptions& options,
@@ -485,7 +545,10 @@ std::string report_page(const CheckResult& result, const Lens& lens, const CamOp
                       escape_html("A lens for wall and lamp as they are: lensforge design with " +
                                   words_of(result.next.options) + "."));
   }
-  const std::array<NamedText, 4> facts{{
+  const std::string chart = result.chart ? std::to_string(result.chart->marks) +
+                                               " marks in sight; " + words_of(*result.chart, lens)
+                                         : "none in sight";
+  const std::array<NamedText, 5> facts{{
       {"MAE against the target", likeness_row(result.to_target)},
       {"MAE against the forecast", likeness_row(result.to_forecast)},
       {"Left unexplained, rms of display values", decimal_text(result.fit.residual, 4) +
@@ -493,6 +556,7 @@ std::string report_page(const CheckResult& result, const Lens& lens, const CamOp
                                                       decimal_text(result.fit.unexplained, 4)},
       {"Photograph", decimal_text(result.seen_pixels, 0) + " pixels across the picture, " +
                          percent_text(result.unusable) + " clipped"},
+      {"Chart on the wall", chart},
   }};
   const auto figure = [](const Image& image, const char* caption) {
     return html_figure(grey_picture(image), caption, caption);

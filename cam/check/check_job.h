@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -57,15 +58,23 @@ struct NextLens {
   std::vector<Option> options;      ///< For the wall and the lamp as they are.
 };
 
+/// What a chart on the wall tells.
+struct ChartFinding {
+  int marks = 0;       ///< In sight.
+  double width = 0.0;  ///< Of the picture on the wall, mm.
+  double error = 0.0;  ///< Standard, mm.
+};
+
 /// What a photograph shows of a lens, its pictures with the lens's pixels, linear light.
 struct CheckResult {
   Image rectified;  ///< Without the room's light and the camera's falloff, as bright as the target.
   Image forecast;
   Likeness to_target, to_forecast;
   CauseFit fit;
-  NextLens next;             ///< By `fit`.
-  bool part = false;         ///< The forecast is the part's; else the design's.
-  std::string fault;         ///< Why it is not.
+  NextLens next;      ///< By `fit`.
+  bool part = false;  ///< The forecast is the part's; else the design's.
+  std::string fault;  ///< Why it is not.
+  std::optional<ChartFinding> chart;
   double seen_pixels = 0.0;  ///< Of the photograph, across the picture.
   double unusable = 0.0;     ///< Share of the picture that is clipped.
 };
@@ -77,6 +86,8 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options, const 
 
 /// A cause in words: "the wall is 6.1 ± 0.2 mm too far: move it nearer".
 std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions& options);
+/// "by the chart the picture is 104.1 ± 0.2 mm wide, planned 100 mm"
+std::string words_of(const ChartFinding& chart, const Lens& lens);
 /// What is wrong, in a sentence: that of the likeliest cause, or that nothing shows.
 std::string verdict_of(const CheckResult& result, const Lens& lens, const CamOptions& options);
 

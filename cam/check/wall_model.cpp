@@ -256,6 +256,16 @@ bool WallModel::shows(Deviation deviation) const {
   }
 }
 
+Deviations WallModel::within_limits(const Deviations& deviations) const {
+  const DeviationLimits limits = deviation_limits(lens_.setup);
+  return deviations.cwiseMax(limits.least).cwiseMin(limits.most);
+}
+
+double WallModel::log_size(const Deviations& deviations) const {
+  const double share = std::sqrt(lens_.setup.lens_size.prod() / lens_.setup.image_size.prod());
+  return std::log1p(share * within_limits(deviations)[index_of(Deviation::kLampDistance)]);
+}
+
 /// Light and screen; the rest is the part's.
 OpticalSetup WallModel::optics_of(const Deviations& deviations) const {
   const auto of = [&](Deviation d) { return deviations[index_of(d)]; };
@@ -266,6 +276,9 @@ OpticalSetup WallModel::optics_of(const Deviations& deviations) const {
                         lamp_distance(lens_.setup).value_or(1.0);
   if (of(Deviation::kLampDistance) != 0.0) {
     move_lamp(optics, of(Deviation::kLampDistance) / away);
+    const double size = std::exp(log_size(deviations));
+    optics.image_origin += 0.5 * (1.0 - size) * optics.image_size;
+    optics.image_size *= size;
   }
   optics.ior = 1.0 + (optics.ior - 1.0) * (1.0 + of(Deviation::kIndex));
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(of(Deviation::kTiltY), optics.screen_y) *
@@ -299,8 +312,7 @@ std::vector<double> WallModel::clear_flux(const Deviations& deviations) const {
 }
 
 Image WallModel::picture(const Deviations& deviations) const {
-  const DeviationLimits limits = deviation_limits(lens_.setup);
-  const Deviations within = deviations.cwiseMax(limits.least).cwiseMin(limits.most);
+  const Deviations within = within_limits(deviations);
   return pictures_.of(within, [&] {
     Deviations clear = within;
     clear[index_of(Deviation::kHaze)] = 0.0;

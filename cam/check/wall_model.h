@@ -80,6 +80,9 @@ class WallModel {
   /// Irradiance relative to all light spread evenly over the picture. Deviations beyond
   /// deviation_limits() count as these. @throw Interrupted
   [[nodiscard]] Image picture(const Deviations& deviations) const;
+  /// ln of the size of that picture's pixels, in planned ones: those of another lamp's distance
+  /// grow with the shadow of the lens, in which details keep their places.
+  [[nodiscard]] double log_size(const Deviations& deviations) const;
 
   [[nodiscard]] const Lens& lens() const { return lens_; }
   [[nodiscard]] const CamOptions& options() const { return options_; }
@@ -131,6 +134,7 @@ class WallModel {
   [[nodiscard]] std::shared_ptr<const Part> part(const Deviations& deviations) const;
   /// Shares of the light of a part.
   [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
+  [[nodiscard]] Deviations within_limits(const Deviations& deviations) const;
   [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
   [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
   /// Shares of the light, of the lens as designed where there is no part, and without haze.

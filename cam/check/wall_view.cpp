@@ -24,6 +24,9 @@ void require_same_size(const Image& one, const Image& other, const std::string& 
                    "; take both from the same place with the same camera");
 }
 
+/// Level of the wall without the picture: this share of a photograph is darker.
+constexpr double kWallShare = 0.1;
+
 /// A value below which this share of the picture lies.
 double quantile(const Image& image, double share) {
   std::vector<float> values(image.values().begin(), image.values().end());
@@ -92,8 +95,28 @@ Photograph bracketed(const std::vector<Photograph>& exposures) {
       all.light.values()[i] = static_cast<float>(order[k]->light.values()[i] / unit);
       all.usable[i] = 1;
     }
+    const std::optional<SeenChart>& chart = order[k]->chart;
+    if (chart && (!all.chart || chart->corners.size() > all.chart->corners.size())) {
+      all.chart = chart;
+    }
   }
   return all;
+}
+
+Photograph without_chart(Photograph photo) {
+  const Eigen::Matrix3d map = photo.chart->perspective(photo.light);
+  const auto wall = static_cast<float>(quantile(photo.light, kWallShare));
+  for (int r = 0; r < photo.light.rows(); ++r) {
+    for (int c = 0; c < photo.light.columns(); ++c) {
+      const Eigen::Vector3d seen = map * place_in(photo.light, {c + 0.5, r + 0.5}).homogeneous();
+      const Eigen::Vector2d at = seen.hnormalized();
+      if (seen.z() <= 0.0 || at.minCoeff() < 0.0 || (chart_size() - at).minCoeff() < 0.0) continue;
+      photo.light.at(c, r) = wall;
+      photo.usable[static_cast<std::size_t>(r) * static_cast<std::size_t>(photo.light.columns()) +
+                   static_cast<std::size_t>(c)] = Photograph::kCovered;
+    }
+  }
+  return photo;
 }
 
 Photograph shrunk(const Photograph& photo, double by) {
@@ -103,7 +126,13 @@ Photograph shrunk(const Photograph& photo, double by) {
   const int rows = photo.light.rows() / parts;
   const int left = (photo.light.columns() - columns * parts) / 2;
   const int top = (photo.light.rows() - rows * parts) / 2;
-  Photograph less{Image(columns, rows), {}, photo.name};
+  Photograph less{Image(columns, rows), {}, photo.name, photo.chart};
+  if (less.chart) {
+    less.chart->error /= parts;
+    for (SeenChart::Corner& corner : less.chart->corners) {
+      corner.pixel = (corner.pixel - Eigen::Vector2d(left, top)) / parts;
+    }
+  }
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
       double sum = 0.0;
@@ -181,8 +210,7 @@ double half_diagonal(const Image& image) { return 0.5 * std::hypot(image.columns
 
 /// X of a pixel's middle.
 Eigen::Vector2d place_of(const Image& image, int column, int row) {
-  return Eigen::Vector2d(column + 0.5 - 0.5 * image.columns(), row + 0.5 - 0.5 * image.rows()) /
-         half_diagonal(image);
+  return place_in(image, {column + 0.5, row + 0.5});
 }
 
 double falloff_of(const Eigen::VectorXd& view, const Eigen::Vector2d& x) {
@@ -197,6 +225,10 @@ double room_of(const Eigen::VectorXd& view, const Eigen::Vector2d& x) {
 }
 
 }  // namespace
+
+Eigen::Vector2d place_in(const Image& photo, const Eigen::Vector2d& pixel) {
+  return (pixel - 0.5 * Eigen::Vector2d(photo.columns(), photo.rows())) / half_diagonal(photo);
+}
 
 double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, double light) {
   return (light / falloff_of(view, pixel) - room_of(view, pixel)) / view[view::kGain];
@@ -222,6 +254,8 @@ SeenPixels::SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, dou
       seen.push_back(encode(kToe + photo.light.at(c, r)));
     }
   }
+  if (photo.chart) tie_.emplace(*photo.chart, photo.light);
+  if (tie_) seen.resize(seen.size() + static_cast<std::size_t>(tie_->size()), 0.0);
   seen_ = Eigen::Map<const Eigen::VectorXd>(seen.data(), std::ssize(seen));
 }
 
@@ -261,7 +295,8 @@ WallPicture::Light SeenPixels::seen_light(const Eigen::VectorXd& view, const Wal
 
 Eigen::VectorXd SeenPixels::shown(const Eigen::VectorXd& view, const WallPicture& wall) const {
   Eigen::VectorXd shown(size());
-  for (Eigen::Index i = 0; i < size(); ++i) {
+  if (tie_) shown.tail(tie_->size()) = in_steps(tie_->residuals(view, wall.log_size));
+  for (Eigen::Index i = 0; i < std::ssize(places_); ++i) {
     const Eigen::Vector2d& place = places_[static_cast<std::size_t>(i)];
     shown[i] = encode(kToe + falloff_of(view, place) *
                                  (view[view::kGain] * seen_light(view, wall, place).value +
@@ -273,7 +308,8 @@ Eigen::VectorXd SeenPixels::shown(const Eigen::VectorXd& view, const WallPicture
 Eigen::MatrixXd SeenPixels::derivatives(const Eigen::VectorXd& view,
                                         const WallPicture& wall) const {
   Eigen::MatrixXd rows(size(), static_cast<int>(view::kCount));
-  for (Eigen::Index i = 0; i < size(); ++i) {
+  if (tie_) rows.bottomRows(tie_->size()) = in_steps(tie_->derivatives(view));
+  for (Eigen::Index i = 0; i < std::ssize(places_); ++i) {
     const Eigen::Vector2d& x = places_[static_cast<std::size_t>(i)];
     const WallPicture::Light light = seen_light(view, wall, x);
     const double falloff = falloff_of(view, x);
@@ -303,7 +339,7 @@ double SeenPixels::correlation(const Eigen::VectorXd& view, const WallPicture& w
   const Eigen::VectorXd all = shown(view, wall);
   std::vector<double> one;
   std::vector<double> other;
-  for (Eigen::Index i = 0; i < size(); ++i) {
+  for (Eigen::Index i = 0; i < std::ssize(places_); ++i) {
     if (wall_of(view, places_[static_cast<std::size_t>(i)]).lpNorm<Eigen::Infinity>() > 1.0) {
       continue;
     }
@@ -457,7 +493,7 @@ WallPicture coarser(const WallPicture& wall, double columns) {
                                       std::min(r + cut, wall.light.rows() - 1));
     }
   }
-  return {resample(inside, wide, high), margin};
+  return {resample(inside, wide, high), margin, wall.log_size};
 }
 
 constexpr double kReach = 1.2;  ///< Of SeenPixels: the picture and some wall around it.
@@ -476,7 +512,7 @@ std::vector<int> with_light(std::vector<int> free) {
 }
 
 /// Level of the wall without the picture.
-double ambient_of(const Image& light) { return quantile(light, 0.1); }
+double ambient_of(const Image& light) { return quantile(light, kWallShare); }
 
 /// Dimmest picture that 8 bits resolve.
 constexpr double kTooDark = 0.02;
@@ -558,18 +594,23 @@ Match best_match(const Photograph& photo, const WallPicture& wall) {
     return Eigen::Vector2d(2.0 * (c + 0.5 - wall.margin) / wall.inner_columns() - 1.0,
                            2.0 * (r + 0.5 - wall.margin) / wall.inner_rows() - 1.0);
   });
-  const Eigen::VectorXd even = view_from(seen, shown, Eigen::Matrix2d::Identity());
+  const auto start = [&](const Eigen::Matrix2d& turn) {
+    if (!small.chart) return view_from(seen, shown, turn);
+    return view_by_chart(*small.chart, small.light, seen.mean, shown.mean, turn);
+  };
+  const Eigen::VectorXd even = start(Eigen::Matrix2d::Identity());
   const Level level(photo, wall, even, kFirstAcross);
   const Level finer(photo, wall, even, kCoarseAcross);
   const double gain = level_of(small.light, ambient) / level_of(wall.light, 0.0);
   Match best;
   double upright = -1.0;
   for (const Pose& pose : poses()) {
-    Eigen::VectorXd view = view_from(seen, shown, pose.turn);
+    Eigen::VectorXd view = start(pose.turn);
     view[view::kGain] = gain;
     view[view::kAmbient] = ambient;
     const SeenPixels pixels(level.photo, view, 1.5);
-    view = fit_view(pixels, level.wall, view, with_light(first(6)));
+    // Where a chart gives the perspective it would be lost.
+    if (!small.chart) view = fit_view(pixels, level.wall, view, with_light(first(6)));
     view = fit_view(pixels, level.wall, view, with_light(first(8)));
     const SeenPixels more(finer.photo, view, 1.3);
     view = fit_view(more, finer.wall, view, with_light(first(8)));

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "cam/check/chart.h"
+#include "cam/check/chart_tie.h"
 #include "cam/coupon/coupon_fit.h"
 #include "core/image/image.h"
 
@@ -13,12 +16,16 @@ namespace lensforge {
 /// A photograph of the wall in linear light.
 struct Photograph {
   Image light;                        ///< 1 is the white of the file.
-  std::vector<unsigned char> usable;  ///< Per pixel: 1 unless it is clipped.
+  std::vector<unsigned char> usable;  ///< Per pixel: 0 if it is clipped, kCovered, else 1.
   std::string name;                   ///< For messages.
+  std::optional<SeenChart> chart = {};
+
+  /// Of a pixel that shows the chart in place of the wall.
+  static constexpr unsigned char kCovered = 2;
 
   [[nodiscard]] bool is_usable(int column, int row) const {
     return usable[static_cast<std::size_t>(row) * static_cast<std::size_t>(light.columns()) +
-                  static_cast<std::size_t>(column)] != 0;
+                  static_cast<std::size_t>(column)] == 1;
   }
 };
 
@@ -36,6 +43,13 @@ Photograph photograph(Image light, const Image& dark, const std::string& name);
 /// @throw InputError if sizes differ, or two have too few pixels in common.
 Photograph bracketed(const std::vector<Photograph>& exposures);
 
+/// The same without the light of its chart, in whose place is that of the darkest wall.
+/// @pre there is a chart.
+Photograph without_chart(Photograph photo);
+
+/// Place of a pixel from the photograph's middle in half diagonals.
+Eigen::Vector2d place_in(const Image& photo, const Eigen::Vector2d& pixel);
+
 /// The same with pixels about `by` times as wide: means of light over whole pixels, clipped if any
 /// of them is; up to `by` columns and rows at its sides are left out.
 Photograph shrunk(const Photograph& photo, double by);
@@ -45,6 +59,9 @@ Photograph shrunk(const Photograph& photo, double by);
 struct WallPicture {
   Image light;
   int margin = 0;
+  /// ln of the size on the wall of what the coordinates take for 1, in half the planned picture's:
+  /// a lamp's distance changes it, and the pictures stay alike.
+  double log_size = 0.0;
 
   [[nodiscard]] double inner_columns() const { return light.columns() - 2.0 * margin; }
   [[nodiscard]] double inner_rows() const { return light.rows() - 2.0 * margin; }
@@ -78,15 +95,24 @@ Eigen::Vector2d wall_of(const Eigen::VectorXd& view, const Eigen::Vector2d& pixe
 /// Light p of the wall's picture from that of a pixel. @param pixel  X.
 double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, double light);
 
-/// Pixels of a photograph that see the wall around a picture, and their light. Display values are
-/// sRGB's of 2 % of white more than the light.
+/// Pixels of a photograph that see the wall around a picture, and their light, as display values:
+/// sRGB's of 2 % of white more than the light. Where the photograph has a chart, its ChartTie's
+/// residuals follow the display values, one standard error as a step of these.
 class SeenPixels {
  public:
   /// Pixels whose wall lies within `reach` (1: the rectangle itself) by this view.
   /// @param view  of a photograph with these proportions.
   SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, double reach);
 
-  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(places_.size()); }
+  [[nodiscard]] const std::optional<ChartTie>& tie() const { return tie_; }
+  /// Takes the chart's size for certain, too, but for the error of its bar.
+  /// @param step  display values as uncertain as a standard error of the chart's.
+  void trust_bar(double step) {
+    step_ = step;
+    bar_ = true;
+  }
+  /// Of all values.
+  [[nodiscard]] Eigen::Index size() const { return seen_.size(); }
   /// Display values that the view makes of a picture: the mean of nine places in every pixel, with
   /// the variance of the pixel on the wall where it is wider than the picture's.
   [[nodiscard]] Eigen::VectorXd shown(const Eigen::VectorXd& view, const WallPicture& wall) const;
@@ -105,9 +131,20 @@ class SeenPixels {
   [[nodiscard]] WallPicture::Light seen_light(const Eigen::VectorXd& view, const WallPicture& wall,
                                               const Eigen::Vector2d& place) const;
 
+  /// Of the tie's residuals in order, or their derivatives, those that count, in display values.
+  template <class Rows>
+  [[nodiscard]] Rows in_steps(Rows rows) const {
+    rows *= step_;
+    if (!bar_) rows.bottomRows(1).setZero();
+    return rows;
+  }
+
   std::vector<Eigen::Vector2d> places_;
   Eigen::VectorXd seen_;
   double pixel_;  ///< Side, in half diagonals.
+  std::optional<ChartTie> tie_;
+  double step_ = 0.03;  ///< About what a picture's forecast leaves before anything is fitted to it.
+  bool bar_ = false;
 };
 
 /// Fit of a view's values, some free, to a photograph of a known picture.

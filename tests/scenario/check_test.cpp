@@ -70,5 +70,38 @@ TEST_F(BadPhotograph, FitWouldReplaceAFileOfTheUsers) {
   expect_refused({path("wall.png"), "--fit", path("shop.toml")}, {"--fit", "shop.toml", "--force"});
 }
 
+class ChartForTheWall : public Scenario {
+ protected:
+  void expect_no_chart(Arguments arguments, const std::vector<std::string>& parts) const {
+    arguments.insert(arguments.begin(), "check");
+    expect_refusal(run(arguments), 2, parts);
+    EXPECT_FALSE(fs::exists(at("chart.svg")));
+  }
+};
+
+TEST_F(ChartForTheWall, IsWrittenAndReplaced) {
+  const Arguments twice = {"check", "--chart", path("chart.svg"), "--chart-bar", "80mm"};
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(run(twice).exit_code, 0);
+    EXPECT_NE(content(at("chart.svg")).find(">80 mm<"), std::string::npos);
+  }
+  write(at("chart.svg"), "<svg>mine</svg>");
+  expect_refusal(run(twice), 2, {"--chart", "chart.svg", "--force"});
+}
+
+TEST_F(ChartForTheWall, NeedsAPlace) {
+  write(at("file"), "no folder");
+  expect_no_chart({"--chart", path("file/chart.svg")}, {"file"});
+  expect_no_chart({path("lens"), "--chart", path("chart.svg")}, {"LENS", "--chart"});
+  expect_no_chart({"--chart", path("chart.svg"), "--chart-bar", "0mm"},
+                  {"--chart-bar", "must be 1 to 1000"});
+}
+
+TEST_F(ChartForTheWall, WithoutItACheckNeedsItsFiles) {
+  expect_no_chart({}, {"LENS: is missing"});
+  expect_no_chart({path("lens")}, {"PHOTO: is missing"});
+  expect_no_chart({path("lens"), path("wall.png")}, {"--out: is missing"});
+}
+
 }  // namespace
 }  // namespace lensforge::scenario

@@ -87,9 +87,9 @@ def nest(
 ) -> dict[str, Any]: ...
 def coupon(out: _Path, *, progress: _Progress = None, **options: _Option) -> dict[str, Any]: ...
 def check(
-    lens: Lens | _Path,
-    photos: _Path | Iterable[_Path],
-    out: _Path,
+    lens: Lens | _Path | None = None,
+    photos: _Path | Iterable[_Path] = (),
+    out: _Path | None = None,
     *,
     progress: _Progress = None,
     **options: _Option,

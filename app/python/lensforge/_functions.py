@@ -140,20 +140,21 @@ def coupon(out, *, progress=None, **options):
 
 
 @with_options("check")
-def check(lens, photos, out, *, progress=None, **options):
+def check(lens=None, photos=(), out=None, *, progress=None, **options):
     """Finds a lens's picture in a photograph of the wall and says what went wrong.
 
     lens: a saved Lens or a lens folder's path; photos: a path, or paths of several exposures; out:
     the folder to write; progress: as in design(). Returns a dict with "verdict", "causes" and what
-    else check.json has. The options are those of lensforge check:
+    else check.json has. None of these three is needed with chart=, which writes a chart for the
+    wall and returns its "files". The options are those of lensforge check:
     """
     if isinstance(photos, (str, bytes, os.PathLike)):
         photos = [photos]
-    given = {
-        "LENS": _folder(lens),
-        "PHOTO": [path_of(photo) for photo in photos],
-        "--out": path_of(out),
-    }
+    given = {"PHOTO": [path_of(photo) for photo in photos]}
+    if lens is not None:
+        given["LENS"] = _folder(lens)
+    if out is not None:
+        given["--out"] = path_of(out)
     with function_of(progress) as told:
         return _lensforge.check(given, options, told)
 

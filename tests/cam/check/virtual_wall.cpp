@@ -16,6 +16,7 @@
 #include "cam/milled/polished_field.h"
 #include "cam/plan/finishing.h"
 #include "core/image/color.h"
+#include "core/image/svg_drawing.h"
 #include "core/lens/surface_field.h"
 
 namespace lensforge::virtual_wall {
@@ -75,6 +76,14 @@ OpticalSetup seen_wall(const OpticalSetup& lens, const Fault& fault) {
   setup.image_size += 2.0 * margin;
   setup.pixels = kFine * (setup.pixels + 2 * more);
   setup.focal_length *= 1.0 + fault.distance;
+  if (fault.vergence != 0.0) {
+    const double away = lens.focal_length / fault.vergence;
+    const Eigen::Vector2d middle = 0.5 * setup.lens_size;
+    const Eigen::Vector3d direction = std::get<ParallelLight>(setup.lamp).direction.normalized();
+    setup.lamp = PointSource{Eigen::Vector3d(middle.x(), middle.y(), 0.0) - away * direction,
+                             Emission::kIsotropic};
+    setup.extent.width *= away;
+  }
   setup.ior += fault.index;
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(fault.tilt_y, Eigen::Vector3d::UnitY()) *
                                 Eigen::AngleAxisd(fault.tilt_x, Eigen::Vector3d::UnitX()))
@@ -270,6 +279,19 @@ double light_at(const WallLight& wall, const Eigen::Vector2d& at) {
   return std::max(sum, 0.0);
 }
 
+/// Light that the wall, or the last sheet there, reflects.
+double reflectance_at(const WallLight& wall, const Eigen::Vector2d& at) {
+  double share = 1.0;
+  for (const WallLight::Sheet& sheet : wall.sheets) {
+    const Eigen::Vector2d own = Eigen::Rotation2Dd(-sheet.turn) * (at - sheet.middle);
+    const Eigen::Vector2d place = (own.cwiseQuotient(sheet.size).array() + 0.5).matrix();
+    if (place.minCoeff() < 0.0 || place.maxCoeff() > 1.0) continue;
+    const Eigen::Vector2d pixels(sheet.light.columns(), sheet.light.rows());
+    share = bilinear(sheet.light, Eigen::Vector2d(place.cwiseProduct(pixels)));
+  }
+  return share;
+}
+
 /// A camera's rays: pixel → place on the wall.
 class Pinhole {
  public:
@@ -279,6 +301,7 @@ class Pinhole {
                                   std::sin(camera.pitch),
                                   std::cos(camera.yaw) * std::cos(camera.pitch));
     from_ = -camera.away * width * towards;
+    from_.head<2>() += width * camera.aim;
     const Eigen::Vector3d right = Eigen::Vector3d::UnitY().cross(towards).normalized();
     const Eigen::Vector3d down = towards.cross(right);
     right_ = std::cos(camera.roll) * right + std::sin(camera.roll) * down;
@@ -322,16 +345,20 @@ Image photograph(const WallLight& wall, const Eigen::Vector2d& picture, const Ca
   for (int r = 0; r < camera.rows; ++r) {
     for (int c = 0; c < camera.columns; ++c) {
       double sum = 0.0;
-      for (int k = 0; lit && k < kParts * kParts; ++k) {
+      double reflected = 0.0;
+      for (int k = 0; k < kParts * kParts; ++k) {
         const int across = k % kParts;
         const int down = k / kParts;
         const Eigen::Vector2d at(c + (across + 0.5) / kParts - half,
                                  r + (down + 0.5) / kParts - 0.5 * camera.rows);
-        sum += light_at(wall, pinhole.wall(at / half)) / (kParts * kParts);
+        const Eigen::Vector2d place = pinhole.wall(at / half);
+        const double share = reflectance_at(wall, place) / (kParts * kParts);
+        reflected += share;
+        if (lit) sum += share * light_at(wall, place);
       }
       const Eigen::Vector2d middle((c + 0.5) / half - 1.0, (r + 0.5 - 0.5 * camera.rows) / half);
       const double falloff = 1.0 - camera.vignetting * middle.squaredNorm() / corner;
-      const double room = camera.ambient * (1.0 + camera.slope * middle.x());
+      const double room = camera.ambient * (1.0 + camera.slope * middle.x()) * reflected;
       const double photons = camera.well * falloff * (exposure * sum + room);
       const double light = (photons + std::sqrt(photons + 25.0) * normal(random)) / camera.well;
       photo.at(c, r) = static_cast<float>(
@@ -341,6 +368,16 @@ Image photograph(const WallLight& wall, const Eigen::Vector2d& picture, const Ca
   if (camera.jpeg > 0) compress(photo, camera.jpeg);
   for (float& value : photo.values()) value = static_cast<float>(decode(value / 255.0));
   return photo;
+}
+
+WallLight::Sheet printed_chart(const std::filesystem::path& drawing, double bar,
+                               const Eigen::Vector2d& middle, double turn) {
+  constexpr int kPixels = 840;
+  constexpr float kInk = 0.06F;
+  constexpr float kPaper = 1.1F;
+  Image light = draw_svg(drawing, kPixels).light;
+  for (float& value : light.values()) value = kInk + (kPaper - kInk) * value;
+  return {std::move(light), bar * Eigen::Vector2d(1.48, 2.1), middle, turn};
 }
 
 Camera any_camera(std::uint64_t seed) {

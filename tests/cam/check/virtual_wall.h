@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct Fault {
   double tilt_x = 0.0;       ///< Of the wall about the picture's x axis, rad.
   double tilt_y = 0.0;       ///< rad
   double lamp = 0.0;         ///< Of the lamp's width, a share.
+  double vergence = 0.0;     ///< Of parallel light: focal length over the lamp's distance.
   double index = 0.0;        ///< Of the index.
   double sigma = 0.0;        ///< Of the polish's σ, a share.
   double ball = 0.0;         ///< Of the ball's radius, a share.
@@ -42,7 +44,20 @@ inline constexpr int kFine = 8;  ///< Pixels of the wall per pixel of the pictur
 struct WallLight {
   Image light;
   Eigen::Vector2d size{0.0, 0.0};  ///< mm; the picture is in its middle.
+
+  /// A sheet on the wall.
+  struct Sheet {
+    Image light;             ///< Share of light that it reflects, as a share of the wall's.
+    Eigen::Vector2d size;    ///< mm
+    Eigen::Vector2d middle;  ///< From the picture's, to the right and down, mm.
+    double turn = 0.0;       ///< Clockwise, rad.
+  };
+  std::vector<Sheet> sheets = {};
 };
+
+/// A printed chart: the drawing in a file. @param bar  length of its bar on the wall, mm.
+WallLight::Sheet printed_chart(const std::filesystem::path& drawing, double bar,
+                               const Eigen::Vector2d& middle, double turn = 0.0);
 
 /// Cuts a lens once and shows what parts with faults project.
 class Workshop {
@@ -66,12 +81,13 @@ class Workshop {
 struct Camera {
   int columns = 264;
   int rows = 198;
-  double focal = 1.2;  ///< In widths of the photograph.
-  double yaw = 0.0;    ///< From the wall's normal, rad.
-  double pitch = 0.0;  ///< rad
-  double roll = 0.0;   ///< rad
-  double away = 2.2;   ///< Distance, in widths of the picture.
-  double k1 = 0.0;     ///< Distortion by radius in half widths (Brown).
+  double focal = 1.2;             ///< In widths of the photograph.
+  double yaw = 0.0;               ///< From the wall's normal, rad.
+  double pitch = 0.0;             ///< rad
+  double roll = 0.0;              ///< rad
+  double away = 2.2;              ///< Distance, in widths of the picture.
+  Eigen::Vector2d aim{0.0, 0.0};  ///< Place that it looks at, in widths from the picture's middle.
+  double k1 = 0.0;                ///< Distortion by radius in half widths (Brown).
   double k2 = 0.0;
   double vignetting = 0.0;  ///< Share of light that is missing in the corners.
   double white = 0.85;    ///< Display value of the brightest light but for 0.1 %; above 1 it clips.

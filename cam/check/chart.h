@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/image/image.h"
+
+namespace lensforge {
+
+/// A chart to print and fasten on the wall beside a lens's picture: four ArUco marks (0 … 3 of
+/// 4 × 4 cells, Garrido-Jurado et al. 2014) and a scale bar. With a bar of 100 mm it is as large as
+/// a sheet of A5. Places on it are in bars from its upper left corner, to the right and down.
+
+/// Length of the bar, mm.
+inline constexpr double kChartBar = 100.0;
+
+/// The chart as an SVG drawing in mm. @param bar  mm
+std::string chart_drawing(double bar);
+
+/// Size of the chart, bars.
+Eigen::Vector2d chart_size();
+
+/// A chart in a photograph.
+struct SeenChart {
+  struct Corner {
+    Eigen::Vector2d pixel;  ///< From the photograph's upper left corner.
+    Eigen::Vector2d at;     ///< On the chart.
+  };
+
+  std::vector<Corner> corners;        ///< Four of every mark that is in sight.
+  double error = 0.0;                 ///< Standard, of a corner along each axis, pixels.
+  double bar = kChartBar;             ///< Length of the bar as printed, mm.
+  Eigen::Vector2d picture{0.0, 0.0};  ///< Planned size of the lens's picture, mm.
+
+  [[nodiscard]] int marks() const { return static_cast<int>(corners.size()) / 4; }
+  /// Perspective from photograph to chart, of places beside the photograph's middle in half
+  /// diagonals. @param photo  as large as the corners' one. @pre a mark
+  [[nodiscard]] Eigen::Matrix3d perspective(const Image& photo) const;
+};
+
+/// Marks that a chart needs: with fewer its scale is poor, and what is found may be no chart.
+inline constexpr int kFewestMarks = 2;
+
+/// Finds the marks of a chart that are in sight, in whatever light the wall has: dark
+/// quadrilaterals on a brighter ground whose cells are those of a mark. Corners are those of lines
+/// through their sides. A mirrored chart is not one. Marks need 25 pixels, and 2 % of the longer
+/// side. @return none if no mark is in sight, or more than one in no
+/// common perspective.
+/// @param name  of the photograph. @throw InputError if a mark is in it twice.
+std::optional<SeenChart> find_chart(const Image& light, const std::string& name);
+
+}  // namespace lensforge
