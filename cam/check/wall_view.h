@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "cam/check/chart.h"
-#include "cam/check/chart_tie.h"
 #include "cam/coupon/coupon_fit.h"
 #include "core/image/image.h"
 

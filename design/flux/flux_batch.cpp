@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "design/flux/lanes.h"
+
 namespace lensforge {
 namespace {
 
@@ -211,6 +213,13 @@ void deposit_adjoint_batch(const TriangleBatch& triangles, int count,
   for (int i = 0; i < count; ++i) {
     if (usual[i] == 0) bars.set(i, deposit_adjoint(triangles.at(i), cotangent));
   }
+}
+
+Lanes widest_lanes() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2") != 0) return Lanes::kFour;
+#endif
+  return Lanes::kTwo;
 }
 
 }  // namespace lensforge
