@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/lamp_command.h"
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
@@ -31,14 +32,14 @@ struct CheckSettings {
   std::string workshop_text;
   std::string fit;
   bool force = false;
+  LampFrom lamp;
   CamOptions cam;
 };
 
 void describe(Description& d, CheckSettings& settings) {
-  d.text("LENS", settings.source, "", "lens folder").needed = true;
+  d.text("LENS", settings.source, "", "lens folder");
   d.texts("PHOTO", settings.photos, "",
-          "photograph of the wall; several of the same view with different exposures count as one")
-      .needed = true;
+          "photograph of the wall; several of the same view with different exposures count as one");
   d.text("--out", settings.out, "DIR", "folder for report, pictures and check.json").needed = true;
   d.text("--dark", settings.dark, "PHOTO",
          "the same view and exposure with the lamp off: the room's light, which is subtracted");
@@ -47,6 +48,7 @@ void describe(Description& d, CheckSettings& settings) {
   d.text("--fit", settings.fit, "FILE.toml",
          "write the workshop with what the photograph tells of it, polish.sigma or "
          "finish.pitch_error, for design --made-by and cam --workshop");
+  describe(d, settings.lamp);
   d.flag("--force", settings.force, "replace files that lensforge did not write");
 }
 
@@ -100,33 +102,64 @@ std::optional<OutputFolder> place_of_fit(const CheckSettings& settings) {
                                      FolderLock::Kind::kShared);
 }
 
-/// Writes --fit where there is something to write.
-void write_fit(const CheckSettings& settings, const NextLens& next, std::vector<fs::path>& files,
+/// Writes --fit where there is something to write. @return true if it did.
+bool write_fit(const CheckSettings& settings, const NextLens& next, std::vector<fs::path>& files,
                std::vector<std::string>& warnings) {
-  if (settings.fit.empty()) return;
+  if (settings.fit.empty()) return false;
   if (next.values.empty()) {
     warnings.push_back("--fit " + settings.fit +
                        ": not written; the photograph names nothing of a workshop");
-    return;
+    return false;
   }
-  write_workshop(next, settings.workshop_text, settings.photos.front(), settings.fit);
-  files.emplace_back(settings.fit);
+  try {
+    write_workshop(next, settings.workshop_text, settings.photos.front(), settings.fit);
+    files.emplace_back(settings.fit);
+    return true;
+  } catch (const InputError& error) {
+    warnings.push_back("--fit " + settings.fit + ": not written; " + error.what());
+    return false;
+  }
 }
 
 /// What to do now.
-std::vector<std::string> notes_of(const CheckSettings& settings, const NextLens& next) {
+std::vector<std::string> notes_of(const CheckSettings& settings, const NextLens& next,
+                                  bool fitted) {
   std::vector<std::string> notes{"look at " +
                                  (fs::path(settings.out) / check_file::kReport).string()};
   std::string options = words_of(next.options);
-  if (!settings.fit.empty() && !next.values.empty()) {
-    options = with_word(options, "--made-by ", " ") + shell_word(settings.fit);
-  }
+  if (fitted) options = with_word(options, "--made-by ", " ") + shell_word(settings.fit);
   if (!options.empty()) notes.push_back("next lens: lensforge design PICTURE " + options);
   return notes;
 }
 
+/// @throw InputError
+void require_photos(const CheckSettings& settings) {
+  const std::string rest = " is required; lensforge check --help lists the options";
+  if (settings.source.empty()) throw InputError("LENS" + rest);
+  if (settings.photos.empty()) throw InputError("PHOTO" + rest);
+}
+
+/// The part of --lamp-from. @throw InputError
+LampTask lamp_task(const CheckSettings& settings) {
+  if (!settings.photos.empty()) {
+    throw InputError("PHOTO " + settings.photos.front() + ": --lamp-from takes one photograph, " +
+                     settings.lamp.photo + "; leave the other out");
+  }
+  if (!settings.fit.empty()) {
+    throw InputError("--fit " + settings.fit + ": --lamp-from learns nothing of a workshop");
+  }
+  if (settings.source.empty() && !settings.workshop.empty()) {
+    throw InputError("--workshop " + settings.workshop + ": is of a part; a pinhole has none");
+  }
+  return {settings.lamp, settings.source, settings.dark,
+          settings.out,  settings.force,  settings.cam};
+}
+
 CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   read_shop(settings);
+  if (!settings.lamp.photo.empty()) return measure_lamp(frame, lamp_task(settings));
+  validate(LampTask{settings.lamp, settings.source, "", "", false, {}});
+  require_photos(settings);
   const Lens lens = read_lens(settings.source);
   validate(settings.cam, lens.setup);
   frame.begin_folder(settings.out).remove_partial_files(is_name_of_check);
@@ -139,7 +172,7 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
       check_photograph(lens, settings.cam, photo, frame.executor(), frame.control());
   std::vector<std::string> warnings = warnings_of(lens, result);
   std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
-  write_fit(settings, result.next, files, warnings);
+  const bool fitted = write_fit(settings, result.next, files, warnings);
   nlohmann::json json = check_json(result, lens, settings.cam);
   json["status"] = "done";
   json["options"] = frame.options().used();
@@ -150,7 +183,7 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   }
   text += "  MAE against the target " + fixed(result.to_target.metrics.mae, 4) +
           ", against the forecast " + fixed(result.to_forecast.metrics.mae, 4) + "\n";
-  return {json, text, kDone, warnings, notes_of(settings, result.next)};
+  return {json, text, kDone, warnings, notes_of(settings, result.next, fitted)};
 }
 
 Command<CheckSettings> command() {

@@ -154,7 +154,8 @@ std::string plus_minus(double value, double error, const std::string& unit) {
 }  // namespace
 
 bool is_name_of_check(const std::string& name) {
-  return std::find(kCheckFiles.begin(), kCheckFiles.end(), name) != kCheckFiles.end();
+  return name == check_file::kLamp ||
+         std::find(kCheckFiles.begin(), kCheckFiles.end(), name) != kCheckFiles.end();
 }
 
 CheckResult check_photograph(const Lens& lens, const CamOptions& options, const Photograph& photo,
@@ -597,6 +598,7 @@ std::string words_of(const std::vector<NextLens::Option>& options) {
 
 void write_workshop(const NextLens& next, const std::string& text, const std::string& photo,
                     const std::filesystem::path& out) {
+  validate(next.workshop, "the workshop as fitted");
   std::vector<std::string> lines;
   for (const FittedValue& value : next.values) lines.push_back(fitted_line(value));
   write_whole_file(out, fitted_workshop(text, next.workshop, photo, lines));

@@ -87,7 +87,7 @@ def nest(
 ) -> dict[str, Any]: ...
 def coupon(out: _Path, *, progress: _Progress = None, **options: _Option) -> dict[str, Any]: ...
 def check(
-    lens: Lens | _Path,
+    lens: Lens | _Path | None,
     photos: _Path | Iterable[_Path],
     out: _Path,
     *,

@@ -145,15 +145,16 @@ def check(lens, photos, out, *, progress=None, **options):
 
     lens: a saved Lens or a lens folder's path; photos: a path, or paths of several exposures; out:
     the folder to write; progress: as in design(). Returns a dict with "verdict", "causes" and what
-    else check.json has. The options are those of lensforge check:
+    else check.json has. With lamp_from= photos is empty, lens may be None (a pinhole), and the dict
+    has "lamp" and "next". The options are those of lensforge check:
     """
     if isinstance(photos, (str, bytes, os.PathLike)):
         photos = [photos]
-    given = {
-        "LENS": _folder(lens),
-        "PHOTO": [path_of(photo) for photo in photos],
-        "--out": path_of(out),
-    }
+    given = {"--out": path_of(out)}
+    if lens is not None:
+        given["LENS"] = _folder(lens)
+    if photos:
+        given["PHOTO"] = [path_of(photo) for photo in photos]
     with function_of(progress) as told:
         return _lensforge.check(given, options, told)
 
