@@ -44,6 +44,8 @@ class WallToPhoto {
   [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& wall) {
     constexpr double kStep = 1e-5;
     constexpr int kSteps = 12;
+    constexpr double kLongest = 0.5;  // Half diagonals of the photograph.
+    constexpr double kFarthest = 2.0;
     for (int k = 0; k < kSteps; ++k) {
       const Eigen::Vector2d off = wall_of(view_, last_) - wall;
       Eigen::Matrix2d slope;
@@ -52,9 +54,12 @@ class WallToPhoto {
         slope.col(axis) = (wall_of(view_, moved) - wall - off) / kStep;
       }
       const Eigen::Vector2d step = slope.partialPivLu().solve(off);
-      last_ -= step;
+      if (!step.allFinite()) break;
+      last_ -= step * std::min(1.0, kLongest / step.norm());
       if (step.norm() < 1e-9) break;
     }
+    // Beyond what a strong distortion shows there is no such place: the next one begins anew.
+    if (last_.norm() > kFarthest) last_.setZero();
     return half_ + last_ * half_.norm();
   }
 
