@@ -11,18 +11,194 @@
 #include "app/frame/option_set.h"
 #include "cam/check/chart.h"
 #include "cam/check/check_job.h"
+#include "cam/check/lamp_picture.h"
+#include "cam/check/wall_model.h"
 #include "cam/check/wall_view.h"
+#include "cam/plan/cam_options.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/files.h"
 #include "core/lens/lens.h"
+#include "core/schema/description.h"
 #include "core/schema/toml.h"
+#include "core/text/number_text.h"
 #include "core/text/words.h"
 
 namespace lensforge::app {
 namespace {
 
 namespace fs = std::filesystem;
+
+// --lamp-from: the picture of a lamp from a photograph of the wall.
+
+/// Its options.
+struct LampFrom {
+  std::string photo;      ///< Empty: no lamp is asked for.
+  Pinhole pinhole;        ///< Without a lens.
+  double diameter = 0.0;  ///< Of the hole, mm; 0: not known.
+  double distance = 0.0;  ///< Of the lamp from the hole, mm; 0: far away.
+};
+
+/// What else it takes of `check`.
+struct LampTask {
+  LampFrom lamp;
+  std::string lens;  ///< Folder; empty: a pinhole.
+  std::string dark;
+  std::string out;
+  bool force = false;
+  CamOptions cam;
+};
+
+constexpr double kMrad = 1e3;
+
+/// A measured width, to a hundredth.
+std::string measured_text(double value) { return number_text(to_digits(value, 0.01 * value)); }
+
+void describe(Description& d, LampFrom& lamp) {
+  constexpr double kLeast = 0.01;
+  constexpr double kMost = 1e5;
+  d.text("--lamp-from", lamp.photo, "PHOTO",
+         "write the lamp's picture, source.png for design --source-picture, from a photograph of "
+         "the wall: behind LENS, or without it behind a pinhole");
+  d.length("--pinhole-distance", lamp.pinhole.distance, Limits::zero_or(kLeast, kMost),
+           "of the pinhole from the wall, with --lamp-from");
+  d.length("--photo-width", lamp.pinhole.photo_width, Limits::zero_or(kLeast, kMost),
+           "width of the wall that the photograph of a pinhole's image shows");
+  d.length("--pinhole-diameter", lamp.diameter, Limits::zero_or(kLeast, kMost),
+           "of the pinhole: says how much it blurs; 0: not known");
+  d.length("--lamp-distance", lamp.distance, Limits::zero_or(kLeast, kMost),
+           "of the lamp from the pinhole: gives its width in mm in place of an angle; 0: far away");
+}
+
+/// Options of a pinhole alone, and whether they are given.
+std::vector<std::pair<const char*, bool>> pinhole_options(const LampFrom& lamp) {
+  return {{"--pinhole-distance", lamp.pinhole.distance > 0.0},
+          {"--photo-width", lamp.pinhole.photo_width > 0.0},
+          {"--pinhole-diameter", lamp.diameter > 0.0},
+          {"--lamp-distance", lamp.distance > 0.0}};
+}
+
+/// @throw InputError if the options do not fit each other.
+void require_task(const LampTask& task) {
+  for (const auto& [name, given] : pinhole_options(task.lamp)) {
+    if (given && task.lamp.photo.empty()) {
+      throw InputError(std::string(name) + ": is of --lamp-from; name a photograph with it");
+    }
+    if (given && !task.lens.empty()) {
+      throw InputError(std::string(name) + ": is of a pinhole, which has no lens; leave out " +
+                       task.lens + ", or this option");
+    }
+  }
+  if (task.lamp.photo.empty() || !task.lens.empty()) return;
+  if (task.lamp.pinhole.distance == 0.0 || task.lamp.pinhole.photo_width == 0.0) {
+    throw InputError("--lamp-from " + task.lamp.photo +
+                     ": without LENS needs the scale of a pinhole's image: --pinhole-distance "
+                     "800mm and --photo-width 200mm, what the photograph shows of the wall");
+  }
+}
+
+/// "9.3 mrad" or "3 mm".
+std::string width_words(double width, bool is_size) {
+  return is_size ? measured_text(width) + " mm" : measured_text(kMrad * width) + " mrad";
+}
+
+/// How wide the hole makes the image of a point, as an angle from the hole.
+std::string hole_words(const LampFrom& lamp) {
+  constexpr double kGreen = 550e-6;  // mm
+  if (lamp.diameter == 0.0) return "";
+  const double near = lamp.distance > 0.0 ? 1.0 / lamp.distance : 0.0;
+  const double shadow = lamp.diameter * (1.0 / lamp.pinhole.distance + near);
+  return "  the pinhole blurs it by " + width_words(shadow, false) + " (its diameter) and " +
+         width_words(kGreen / lamp.diameter, false) + " (diffraction)\n";
+}
+
+/// A lamp, how its width is stated, and the options of `design` for it but the picture.
+struct MeasuredLamp {
+  LampPicture picture;
+  bool is_size = false;  ///< mm; else rad.
+  std::vector<NextLens::Option> options;
+
+  /// Of what is lit.
+  [[nodiscard]] double width() const { return picture.lit * picture.width; }
+  void add_width() {
+    if (is_size) {
+      options.push_back({"--source-size", measured_text(picture.width) + "mm"});
+    } else {
+      options.push_back({"--source-angle", measured_text(kMrad * picture.width)});
+    }
+  }
+};
+
+MeasuredLamp by_pinhole(const LampTask& task, const Photograph& photo) {
+  MeasuredLamp lamp{lamp_by_pinhole(photo, task.lamp.pinhole), task.lamp.distance > 0.0, {}};
+  if (lamp.is_size) {
+    lamp.picture.width *= task.lamp.distance;
+    lamp.options = {{"--source", "point"},
+                    {"--source-distance", number_text(task.lamp.distance) + "mm"}};
+  }
+  lamp.add_width();
+  return lamp;
+}
+
+MeasuredLamp by_lens(CommandFrame& frame, const LampTask& task, const Photograph& photo) {
+  const Lens lens = read_lens(task.lens);
+  validate(task.cam, lens.setup);
+  MeasuredLamp lamp{lamp_by_lens(lens, task.cam, photo, frame.executor(), frame.control()),
+                    lamp_distance(lens.setup).has_value(),
+                    {}};
+  lamp.add_width();
+  return lamp;
+}
+
+nlohmann::json lamp_json(const MeasuredLamp& lamp) {
+  const LampPicture& picture = lamp.picture;
+  const double unit = lamp.is_size ? 1.0 : kMrad;
+  nlohmann::json json = {{lamp.is_size ? "size_mm" : "angle_mrad", unit * lamp.width()},
+                         {"pixels_across", picture.pixels}};
+  if (picture.residual > 0.0) json["residual"] = picture.residual;
+  return json;
+}
+
+std::vector<std::string> lamp_warnings(const LampPicture& lamp) {
+  constexpr double kMuch = 0.04;
+  if (lamp.residual < kMuch) return {};
+  return {"lens and lamp leave " + fixed(lamp.residual, 3) +
+          " of a display value unexplained: something else is wrong, too, and is in the lamp's "
+          "picture; take the image of a pinhole"};
+}
+
+/// Writes source.png. @throw InputError as lamp_by_pinhole() and lamp_by_lens().
+CommandResult measure_lamp(CommandFrame& frame, const LampTask& task) {
+  require_task(task);
+  const fs::path file = fs::path(task.out) / check_file::kLamp;
+  frame.begin_folder(task.out).remove_partial_files(is_name_of_check);
+  require_replaceable("--out", file, task.force);
+  Image dark;
+  if (!task.dark.empty()) dark = read_image(task.dark, frame.control()).image;
+  const Photograph photo =
+      photograph(read_image(task.lamp.photo, frame.control()).image, dark, task.lamp.photo);
+  const MeasuredLamp lamp =
+      task.lens.empty() ? by_pinhole(task, photo) : by_lens(frame, task, photo);
+  write_image(lamp.picture.light, file);
+  nlohmann::json design = {{"source-picture", file.string()}};
+  for (const auto& option : lamp.options) design[option.name.substr(2)] = option.value;
+  const nlohmann::json json = {{"lamp", lamp_json(lamp)},
+                               {"next", {{"design", design}}},
+                               {"status", "done"},
+                               {"options", frame.options().used()},
+                               {"files", files_json({file})}};
+  const std::string text = "The lamp is " + width_words(lamp.width(), lamp.is_size) + " wide, " +
+                           fixed(lamp.picture.pixels, 0) + " pixels of the photograph\n" +
+                           hole_words(task.lamp);
+  return {json,
+          text,
+          kDone,
+          lamp_warnings(lamp.picture),
+          {"next lens: lensforge design PICTURE --source-picture " + shell_word(file.string()) +
+           " " + words_of(lamp.options)}};
+}
+
+// The check itself.
 
 /// Options of `lensforge check`.
 struct CheckSettings {
@@ -36,6 +212,7 @@ struct CheckSettings {
   std::string chart;
   double chart_bar = kChartBar;
   bool force = false;
+  LampFrom lamp;
   CamOptions cam;
 };
 
@@ -56,6 +233,7 @@ void describe(Description& d, CheckSettings& settings) {
          "photograph that shows it gives perspective and size for certain");
   d.length("--chart-bar", settings.chart_bar, Limits::between(1.0, 1000.0),
            "length of the chart's scale bar: to draw, or as measured on the print");
+  describe(d, settings.lamp);
   d.flag("--force", settings.force, "replace files that lensforge did not write");
 }
 
@@ -126,27 +304,32 @@ std::optional<OutputFolder> place_of_fit(const CheckSettings& settings) {
                                      FolderLock::Kind::kShared);
 }
 
-/// Writes --fit where there is something to write.
-void write_fit(const CheckSettings& settings, const NextLens& next, std::vector<fs::path>& files,
+/// Writes --fit where there is something to write. @return true if it did.
+bool write_fit(const CheckSettings& settings, const NextLens& next, std::vector<fs::path>& files,
                std::vector<std::string>& warnings) {
-  if (settings.fit.empty()) return;
+  if (settings.fit.empty()) return false;
   if (next.values.empty()) {
     warnings.push_back("--fit " + settings.fit +
                        ": not written; the photograph names nothing of a workshop");
-    return;
+    return false;
   }
-  write_workshop(next, settings.workshop_text, settings.photos.front(), settings.fit);
-  files.emplace_back(settings.fit);
+  try {
+    write_workshop(next, settings.workshop_text, settings.photos.front(), settings.fit);
+    files.emplace_back(settings.fit);
+    return true;
+  } catch (const InputError& error) {
+    warnings.push_back("--fit " + settings.fit + ": not written; " + error.what());
+    return false;
+  }
 }
 
 /// What to do now.
-std::vector<std::string> notes_of(const CheckSettings& settings, const NextLens& next) {
+std::vector<std::string> notes_of(const CheckSettings& settings, const NextLens& next,
+                                  bool fitted) {
   std::vector<std::string> notes{"look at " +
                                  (fs::path(settings.out) / check_file::kReport).string()};
   std::string options = words_of(next.options);
-  if (!settings.fit.empty() && !next.values.empty()) {
-    options = with_word(options, "--made-by ", " ") + shell_word(settings.fit);
-  }
+  if (fitted) options = with_word(options, "--made-by ", " ") + shell_word(settings.fit);
   if (!options.empty()) notes.push_back("next lens: lensforge design PICTURE " + options);
   return notes;
 }
@@ -155,6 +338,10 @@ std::vector<std::string> notes_of(const CheckSettings& settings, const NextLens&
 CommandResult write_chart(CommandFrame& frame, const CheckSettings& settings) {
   if (!settings.source.empty()) {
     throw InputError("LENS " + settings.source + ": --chart writes a chart and checks nothing");
+  }
+  if (!settings.lamp.photo.empty()) {
+    throw InputError("--lamp-from " + settings.lamp.photo +
+                     ": --chart writes a chart and measures nothing");
   }
   require_replaceable("--chart", settings.chart, settings.force);
   frame.begin_file(settings.chart);
@@ -172,17 +359,37 @@ CommandResult write_chart(CommandFrame& frame, const CheckSettings& settings) {
            " without scaling, measure its bar, and photograph it on the wall beside the picture"}};
 }
 
-/// @throw InputError
+/// @throw InputError if something that a check needs is missing.
 void require_given(const char* name, bool given) {
-  if (!given) throw InputError(std::string(name) + ": is missing; see lensforge check --help");
+  if (!given) {
+    throw InputError(std::string(name) + " is required; lensforge check --help lists the options");
+  }
+}
+
+/// The part of --lamp-from. @throw InputError
+LampTask lamp_task(const CheckSettings& settings) {
+  if (!settings.photos.empty()) {
+    throw InputError("PHOTO " + settings.photos.front() + ": --lamp-from takes one photograph, " +
+                     settings.lamp.photo + "; leave the other out");
+  }
+  if (!settings.fit.empty()) {
+    throw InputError("--fit " + settings.fit + ": --lamp-from learns nothing of a workshop");
+  }
+  if (settings.source.empty() && !settings.workshop.empty()) {
+    throw InputError("--workshop " + settings.workshop + ": is of a part; a pinhole has none");
+  }
+  return {settings.lamp, settings.source, settings.dark,
+          settings.out,  settings.force,  settings.cam};
 }
 
 CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   if (!settings.chart.empty()) return write_chart(frame, settings);
-  require_given("LENS", !settings.source.empty());
-  require_given("PHOTO", !settings.photos.empty());
   require_given("--out", !settings.out.empty());
   read_shop(settings);
+  if (!settings.lamp.photo.empty()) return measure_lamp(frame, lamp_task(settings));
+  require_task(LampTask{settings.lamp, settings.source, "", "", false, {}});
+  require_given("LENS", !settings.source.empty());
+  require_given("PHOTO", !settings.photos.empty());
   const Lens lens = read_lens(settings.source);
   validate(settings.cam, lens.setup);
   frame.begin_folder(settings.out).remove_partial_files(is_name_of_check);
@@ -195,7 +402,7 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
       check_photograph(lens, settings.cam, photo, frame.executor(), frame.control());
   std::vector<std::string> warnings = warnings_of(lens, photo, result);
   std::vector<fs::path> files = write_check(result, lens, settings.cam, settings.out);
-  write_fit(settings, result.next, files, warnings);
+  const bool fitted = write_fit(settings, result.next, files, warnings);
   nlohmann::json json = check_json(result, lens, settings.cam);
   json["status"] = "done";
   json["options"] = frame.options().used();
@@ -206,7 +413,7 @@ CommandResult run(CommandFrame& frame, CheckSettings& settings) {
   }
   text += "  MAE against the target " + fixed(result.to_target.metrics.mae, 4) +
           ", against the forecast " + fixed(result.to_forecast.metrics.mae, 4) + "\n";
-  return {json, text, kDone, warnings, notes_of(settings, result.next)};
+  return {json, text, kDone, warnings, notes_of(settings, result.next, fitted)};
 }
 
 Command<CheckSettings> check_verb() {

@@ -18,13 +18,30 @@ namespace lensforge::app {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+std::vector<fs::path> missing_above(const fs::path& path) {
+  std::vector<fs::path> missing;
+  std::error_code ignored;
+  fs::path above = fs::absolute(path, ignored).lexically_normal().parent_path();
+  for (; !above.empty() && !fs::exists(above, ignored); above = above.parent_path()) {
+    missing.push_back(above);
+  }
+  return missing;
+}
+
+}  // namespace
+
 OutputFolder::OutputFolder(fs::path path, FolderLock::Kind kind)
-    : path_(std::move(path)), folder_(FolderLock::make(path_, kind)) {}
+    : path_(std::move(path)),
+      missing_(missing_above(path_)),
+      folder_(FolderLock::make(path_, kind)) {}
 
 OutputFolder::~OutputFolder() {
   if (!folder_.made || !folder_.lock || !folder_.lock->become_exclusive()) return;
   std::error_code ignored;
   fs::remove(path_, ignored);  // Only succeeds on an empty folder.
+  for (const fs::path& above : missing_) fs::remove(above, ignored);
 }
 
 void OutputFolder::remove_partial_files(

@@ -35,8 +35,8 @@ inline bool is_step_file(const std::filesystem::path& path) {
   return has_extension(path, {".step", ".stp"});
 }
 
-/// A command's output folder: created if missing, locked, and removed again if it was created but
-/// stayed empty and nobody else uses it.
+/// A command's output folder: created if missing, locked, and removed again, with the folders above
+/// that were created for it, if it was created but stayed empty and nobody else uses it.
 class OutputFolder {
  public:
   /// @param kind  exclusive for a command that fills the folder; shared for one that writes a
@@ -56,6 +56,8 @@ class OutputFolder {
 
  private:
   std::filesystem::path path_;
+  std::vector<std::filesystem::path>
+      missing_;  ///< Folders above that did not exist, deepest first.
   MadeFolder folder_;
 };
 

@@ -18,6 +18,7 @@
 #include "app/studio/studio_forms.h"
 #include "app/view/lens_view.h"
 #include "cam/cam.h"
+#include "cam/check/check_job.h"
 #include "cam/proposal/proposal.h"
 #include "cam/report/report_html.h"
 #include "core/error.h"
@@ -49,9 +50,11 @@ constexpr const char* kFormat = "lensforge.studio";
 constexpr const char* kKept = ".studio";
 constexpr const char* kPicture = "picture.png";
 constexpr const char* kPreview = "preview.png";
+constexpr const char* kPhoto = "photo";
 constexpr const char* kWorkshop = "workshop.toml";
 constexpr const char* kLensPrefix = "lens-";
 constexpr const char* kCam = "cam";
+constexpr const char* kCheck = "check";
 constexpr const char* kView = "view.html";
 constexpr const char* kEvents = "events.jsonl";
 
@@ -139,6 +142,11 @@ constexpr NamedContent kPartPictures[] = {{cam_file::kWall, "Light on the wall f
                                           {cam_file::kLeakage, "Where light leaks"}};
 constexpr NamedContent kPartFiles[] = {{cam_file::kMilledMesh, "the surface as milled, PLY"},
                                        {cam_file::kReport, "the report, JSON"}};
+
+constexpr NamedContent kCheckPictures[] = {
+    {check_file::kRectified, "The wall, seen straight on"},
+    {check_file::kForecast, "The forecast of the part"},
+    {check_file::kMap, "Brighter than forecast in red, darker in blue"}};
 
 template <std::size_t N>
 json files_of(const fs::path& folder, const std::string& within, const NamedContent (&names)[N],
@@ -303,6 +311,19 @@ void Project::take_picture(std::string_view bytes) {
   save();
 }
 
+void Project::take_photo(std::string_view bytes) {
+  require_idle();
+  const fs::path trial = folder_ / kKept / kPhoto;
+  write_whole_file(trial, bytes);
+  try {
+    read_image(trial);
+  } catch (const InputError&) {
+    fs::remove(trial);
+    throw InputError("the photograph: no picture can be read from it");
+  }
+  fs::rename(trial, folder_ / kPhoto);
+}
+
 void Project::take_settings(const json& changes) {
   json record = record_;
   if (changes.contains("settings")) {
@@ -363,6 +384,10 @@ Arguments Project::words_of(const std::string& step, const std::string& format) 
     if (fs::is_regular_file(folder_ / kWorkshop)) add({"--workshop", kWorkshop});
     // The programs that send takes, unless the workshop states its own.
     if (!record_["workshop"].contains("machine.post")) add({"--post", "grbl"});
+  } else if (step == kCheck) {
+    words.push_back(lens_name());
+    add({kPhoto, "--out", lens_name() + "/" + kCheck});
+    if (fs::is_regular_file(folder_ / kWorkshop)) add({"--workshop", kWorkshop});
   } else if (step == "view") {
     words.push_back(lens_name());
     add({"--out", lens_name() + "/" + kView});
@@ -382,9 +407,10 @@ void Project::start(StudioTask task) {
 
 void Project::run(const json& request) {
   const std::string step = request.value("step", "");
-  static const std::vector<std::string> kSteps{"plan", "design", "cam", "view", "export"};
+  static const std::vector<std::string> kSteps{"plan", "design", "cam", "view", "export", kCheck};
   if (std::find(kSteps.begin(), kSteps.end(), step) == kSteps.end()) {
-    throw InputError("step " + json(step).dump() + ": must be plan, design, cam, view or export");
+    throw InputError("step " + json(step).dump() +
+                     ": must be plan, design, cam, view, export or check");
   }
   const std::string format = request.value("format", "step");
   if (!is_word(format)) {
@@ -395,6 +421,8 @@ void Project::run(const json& request) {
     require_picture();
   } else if (record_.value("current", 0) == 0) {
     throw InputError(step + ": there is no lens yet; design one first");
+  } else if (step == kCheck && !fs::is_regular_file(folder_ / kPhoto)) {
+    throw InputError("there is no photograph yet; choose one");
   }
   const std::string kept = std::string(kKept) + "/";
   StudioTask task{step, words_of(step, format), kept + step};
@@ -550,7 +578,7 @@ json Project::commands_json() const {
   const bool lens = record_.value("current", 0) > 0;
   try {
     for (const char* step : {"plan", "design"}) commands[step] = command_text(words_of(step, ""));
-    for (const char* step : {"cam", "view", "export"}) {
+    for (const char* step : {"cam", "view", "export", kCheck}) {
       if (lens) commands[step] = command_text(words_of(step, "step"));
     }
   } catch (const InputError&) {
@@ -669,6 +697,21 @@ json Project::part_json(const std::string& address) const {
           {"programs", programs}};
 }
 
+json Project::check_json(const std::string& address) const {
+  const std::string within = lens_name() + "/" + kCheck;
+  const fs::path file = folder_ / within / check_file::kJson;
+  const json check = json_in(file);
+  if (!check.is_object()) return nullptr;
+  json more = json::array();
+  const json causes = check.value("causes", json::array());
+  for (std::size_t k = 1; k < causes.size(); ++k) more.push_back(causes[k].value("words", ""));
+  return {
+      {"verdict", check.value("verdict", "")},
+      {"more", more},
+      {"pictures", files_of(folder_, within, kCheckPictures, address)},
+      {"report", address + "files/" + within + "/" + check_file::kReport + "?" + modified(file)}};
+}
+
 json Project::job_json(const std::string& address) const {
   const std::string files = record_.value("job", "");
   json job = job_ ? job_->state() : files.empty() ? json() : earlier_job(folder_, files);
@@ -769,6 +812,8 @@ json Project::state(const std::string& address) {
              {"can_undo", idle && !all.empty() && current > all.front()},
              {"can_redo", idle && !all.empty() && current < all.back()},
              {"part", part_json(address)},
+             {"photo", fs::is_regular_file(folder_ / kPhoto)},
+             {"check", check_json(address)},
              {"job", job_json(address)},
              {"cut", cut_json(address)}};
   constexpr std::size_t kExact = std::size_t{1} << 53U;  // Of JavaScript's numbers.

@@ -40,10 +40,12 @@ class Project {
 
   /// Takes a PNG as the picture; the original if it is empty.
   void take_picture(std::string_view bytes);
+  /// Takes a photograph of the wall for `check`. @throw InputError if no picture can be read.
+  void take_photo(std::string_view bytes);
   /// {"settings": {…}, "workshop": {…}}; null removes a value. @throw InputError naming option or
   /// key, value and rule; then nothing is changed.
   void take_settings(const nlohmann::json& changes);
-  /// {"step": "plan" | "design" | "cam" | "view" | "export", "format": …}
+  /// {"step": "plan" | "design" | "cam" | "view" | "export" | "check", "format": …}
   void run(const nlohmann::json& request);
   /// {"program": "finish.ngc", "port": "sim:grbl@1x", "how": "restart" | "resume"}
   void send(const nlohmann::json& request);
@@ -93,6 +95,7 @@ class Project {
   [[nodiscard]] nlohmann::json plan_json() const;
   [[nodiscard]] nlohmann::json lens_json(const std::string& address) const;
   [[nodiscard]] nlohmann::json part_json(const std::string& address) const;
+  [[nodiscard]] nlohmann::json check_json(const std::string& address) const;
   [[nodiscard]] nlohmann::json job_json(const std::string& address) const;
   [[nodiscard]] nlohmann::json tool_json(const nlohmann::json& position,
                                          const std::filesystem::path& program) const;

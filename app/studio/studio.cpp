@@ -239,6 +239,7 @@ class Studio::Content {
 
   static void act(Project& project, std::string_view action, std::string_view body) {
     if (action == "picture") return project.take_picture(body);
+    if (action == "photo") return project.take_photo(body);
     if (action == "settings") return project.take_settings(parsed(body));
     if (action == "run") return project.run(parsed(body));
     if (action == "pause") return project.pause();

@@ -38,7 +38,7 @@ class ComputeTurn {
 
 /// A command that a project runs.
 struct StudioTask {
-  std::string step;   ///< "plan", "design", "cam", "view", "export", "send"
+  std::string step;   ///< "plan", "design", "cam", "view", "export", "check", "send"
   Arguments words;    ///< Of the command line, as typed in the project's folder.
   std::string files;  ///< Path in the project's folder, without extension, for .out and .log.
   std::filesystem::path checkpoint = {};  ///< Of a design: shown while it runs.

@@ -44,6 +44,8 @@ class WallToPhoto {
   [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& wall) {
     constexpr double kStep = 1e-5;
     constexpr int kSteps = 12;
+    constexpr double kLongest = 0.5;  // Half diagonals of the photograph.
+    constexpr double kFarthest = 2.0;
     for (int k = 0; k < kSteps; ++k) {
       const Eigen::Vector2d off = wall_of(view_, last_) - wall;
       Eigen::Matrix2d slope;
@@ -52,9 +54,12 @@ class WallToPhoto {
         slope.col(axis) = (wall_of(view_, moved) - wall - off) / kStep;
       }
       const Eigen::Vector2d step = slope.partialPivLu().solve(off);
-      last_ -= step;
+      if (!step.allFinite()) break;
+      last_ -= step * std::min(1.0, kLongest / step.norm());
       if (step.norm() < 1e-9) break;
     }
+    // Beyond what a strong distortion shows there is no such place: the next one begins anew.
+    if (last_.norm() > kFarthest) last_.setZero();
     return half_ + last_ * half_.norm();
   }
 
@@ -154,7 +159,8 @@ std::string plus_minus(double value, double error, const std::string& unit) {
 }  // namespace
 
 bool is_name_of_check(const std::string& name) {
-  return std::find(kCheckFiles.begin(), kCheckFiles.end(), name) != kCheckFiles.end();
+  return name == check_file::kLamp ||
+         std::find(kCheckFiles.begin(), kCheckFiles.end(), name) != kCheckFiles.end();
 }
 
 namespace {
@@ -661,6 +667,7 @@ std::string words_of(const std::vector<NextLens::Option>& options) {
 
 void write_workshop(const NextLens& next, const std::string& text, const std::string& photo,
                     const std::filesystem::path& out) {
+  validate(next.workshop, "the workshop as fitted");
   std::vector<std::string> lines;
   for (const FittedValue& value : next.values) lines.push_back(fitted_line(value));
   write_whole_file(out, fitted_workshop(text, next.workshop, photo, lines));

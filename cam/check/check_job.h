@@ -28,6 +28,7 @@ inline constexpr const char* kRectified = "rectified.png";
 inline constexpr const char* kForecast = "forecast.png";
 inline constexpr const char* kTarget = "target.png";
 inline constexpr const char* kMap = "difference.png";
+inline constexpr const char* kLamp = "source.png";  ///< Of `--lamp-from` alone.
 }  // namespace check_file
 inline constexpr std::array kCheckFiles = {check_file::kJson,      check_file::kReport,
                                            check_file::kRectified, check_file::kForecast,
@@ -108,7 +109,8 @@ std::string words_of(const std::vector<NextLens::Option>& options);
 /// Writes the workshop with what was learnt of it, as fit_workshop() does.
 /// @param text   of the workshop's file; empty for the default one.
 /// @param photo  whose name the file's first comment has.
-/// @pre something was learnt. @throw RunError if it cannot be written.
+/// @pre something was learnt. @throw InputError if a value is beyond a workshop's limits; RunError
+/// if it cannot be written.
 void write_workshop(const NextLens& next, const std::string& text, const std::string& photo,
                     const std::filesystem::path& out);
 

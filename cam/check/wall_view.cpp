@@ -262,8 +262,8 @@ SeenPixels::SeenPixels(const Photograph& photo, const Eigen::VectorXd& view, dou
 /// The picture's own pixels are means already: the places add what a pixel's variance on the wall
 /// has beyond theirs, so that neither is blurred more than the other. A perspective changes pixels
 /// by tens of per cent, which would read as another lamp.
-WallPicture::Light SeenPixels::seen_light(const Eigen::VectorXd& view, const WallPicture& wall,
-                                          const Eigen::Vector2d& place) const {
+SeenPixels::Spots SeenPixels::spots(const Eigen::VectorXd& view, const WallPicture& wall,
+                                    const Eigen::Vector2d& place) const {
   constexpr double kShare = 0.25;
   const Eigen::Vector2d at = wall_of(view, place);
   const Eigen::Vector2d side(0.5 * wall.inner_columns(), 0.5 * wall.inner_rows());
@@ -281,16 +281,50 @@ WallPicture::Light SeenPixels::seen_light(const Eigen::VectorXd& view, const Wal
   const double y = std::sqrt(std::max(more(1, 1) - slant * slant, 0.0));
   const Eigen::Vector2d across = Eigen::Vector2d(x, slant).cwiseQuotient(side);
   const Eigen::Vector2d down = Eigen::Vector2d(0.0, y).cwiseQuotient(side);
-  WallPicture::Light mean;
   const double far = std::sqrt(1.5);  // Three places with a variance of 1.
+  Spots spots;
+  std::size_t next = 0;
   for (const double a : {-far, 0.0, far}) {
-    for (const double b : {-far, 0.0, far}) {
-      const WallPicture::Light light = wall.at(at + a * across + b * down);
-      mean.value += light.value / 9.0;
-      mean.gradient += light.gradient / 9.0;
-    }
+    for (const double b : {-far, 0.0, far}) spots.at(next++) = at + a * across + b * down;
+  }
+  return spots;
+}
+
+WallPicture::Light SeenPixels::seen_light(const Eigen::VectorXd& view, const WallPicture& wall,
+                                          const Eigen::Vector2d& place) const {
+  WallPicture::Light mean;
+  for (const Eigen::Vector2d& spot : spots(view, wall, place)) {
+    const WallPicture::Light light = wall.at(spot);
+    mean.value += light.value / 9.0;
+    mean.gradient += light.gradient / 9.0;
   }
   return mean;
+}
+
+SeenPixels::LightRows SeenPixels::light_rows(const Eigen::VectorXd& view, const WallPicture& wall,
+                                             const std::vector<Eigen::Vector2d>& ways,
+                                             Eigen::Index most, const Executor& executor) const {
+  const Eigen::Index every = (size() + most - 1) / most;
+  const Eigen::Index count = (size() + every - 1) / every;
+  const Eigen::Index moved = std::ssize(ways);
+  LightRows rows{Eigen::MatrixXd(count, moved + 3), Eigen::VectorXd(count)};
+  parallel_for(executor, "light rows", count, [&](Eigen::Index row) {
+    const Eigen::Vector2d& place = places_[static_cast<std::size_t>(row * every)];
+    const double light = decode(seen_[row * every]);
+    const double slope = encode_slope(light);
+    const double lit = slope * falloff_of(view, place);
+    const Spots around = spots(view, wall, place);
+    for (Eigen::Index k = 0; k < moved; ++k) {
+      double sum = 0.0;
+      for (const Eigen::Vector2d& spot : around) {
+        sum += wall.at(spot - ways[static_cast<std::size_t>(k)]).value / 9.0;
+      }
+      rows.of(row, k) = lit * view[view::kGain] * sum;
+    }
+    rows.of.row(row).tail(3) << lit, lit * place.x(), lit * place.y();
+    rows.seen[row] = slope * (light - kToe);
+  });
+  return rows;
 }
 
 Eigen::VectorXd SeenPixels::shown(const Eigen::VectorXd& view, const WallPicture& wall) const {
@@ -538,7 +572,7 @@ void require_light(const Photograph& photo) {
   if (static_cast<double>(clipped) > kMostClipped * static_cast<double>(lit)) {
     throw InputError(
         photo.name + ": " +
-        number_text(100.0 * static_cast<double>(clipped) / static_cast<double>(lit), 2) +
+        decimal_text(100.0 * static_cast<double>(clipped) / static_cast<double>(lit), 1) +
         " % of the lit wall is clipped, at most 35 %; expose a quarter as long");
   }
   if (bright < kTooDark) {

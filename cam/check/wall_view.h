@@ -2,12 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "cam/check/chart.h"
 #include "cam/coupon/coupon_fit.h"
+#include "core/compute/executor.h"
 #include "core/image/image.h"
 
 namespace lensforge {
@@ -120,6 +122,17 @@ class SeenPixels {
                                             const WallPicture& wall) const;
   /// Display values of the photograph.
   [[nodiscard]] const Eigen::VectorXd& seen() const { return seen_; }
+  /// A linear problem in light: what pixels get from the picture moved on the wall by each of
+  /// `ways`, then from the three values of the room's light, and what they show; each times the
+  /// slope of display values at what they show.
+  struct LightRows {
+    Eigen::MatrixXd of;
+    Eigen::VectorXd seen;
+  };
+  /// @param most  rows at most: of more pixels every n-th has one.
+  [[nodiscard]] LightRows light_rows(const Eigen::VectorXd& view, const WallPicture& wall,
+                                     const std::vector<Eigen::Vector2d>& ways, Eigen::Index most,
+                                     const Executor& executor) const;
   /// Correlation of both over pixels that see the rectangle itself.
   [[nodiscard]] double correlation(const Eigen::VectorXd& view, const WallPicture& wall) const;
   /// Pixels per independent value of residuals: ((1 + ρ) / (1 − ρ))², ρ their correlation from a
@@ -129,6 +142,10 @@ class SeenPixels {
  private:
   [[nodiscard]] WallPicture::Light seen_light(const Eigen::VectorXd& view, const WallPicture& wall,
                                               const Eigen::Vector2d& place) const;
+  /// Places on the wall whose mean stands for a pixel.
+  using Spots = std::array<Eigen::Vector2d, 9>;
+  [[nodiscard]] Spots spots(const Eigen::VectorXd& view, const WallPicture& wall,
+                            const Eigen::Vector2d& place) const;
 
   /// Of the tie's residuals in order, or their derivatives, those that count, in display values.
   template <class Rows>

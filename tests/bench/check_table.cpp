@@ -246,10 +246,11 @@ void run_single(const Bench& bench, int each, Draw& draw, Confusion& confusion) 
 
 void run_pairs(const Bench& bench, int pairs, Draw& draw) {
   int both = 0;
+  const std::size_t count = causes().size();
   for (int k = 0; k < pairs; ++k) {
-    const auto one = static_cast<std::size_t>(k) % causes().size();
-    const std::size_t other =
-        (one + 1 + static_cast<std::size_t>(k) / causes().size()) % causes().size();
+    const auto pair = static_cast<std::size_t>(k);
+    const std::size_t one = pair % count;
+    const std::size_t other = (one + 1 + pair / count % (count - 1)) % count;  // Not the same.
     Fault fault;
     for (const std::size_t i : {one, other}) {
       const double size = draw();

@@ -12,6 +12,8 @@
 #include <string>
 #include <thread>
 
+#include "core/image/image.h"
+#include "core/image/image_io.h"
 #include "core/temp_folder.h"
 #include "scenario/driver.h"
 
@@ -313,6 +315,44 @@ TEST_F(Studio, LeadsFromPictureToASentProgram) {
   EXPECT_EQ(now["cut"]["status"], "done") << now["cut"];
   EXPECT_EQ(now["cut"]["percent"], 100.0);
   EXPECT_EQ(now["cut"]["tool"].size(), 2U);
+}
+
+/// What a lens projects, in the middle of a dark wall.
+std::string photo_of(const fs::path& picture, const fs::path& out) {
+  constexpr int kBy = 6;
+  const Image light = read_image(picture).image;
+  Image photo(kBy * 2 * light.columns(), kBy * 2 * light.rows(), 0.01F);
+  for (int r = 0; r < kBy * light.rows(); ++r) {
+    for (int c = 0; c < kBy * light.columns(); ++c) {
+      photo.at(c + photo.columns() / 4, r + photo.rows() / 4) += 0.7F * light.at(c / kBy, r / kBy);
+    }
+  }
+  write_image(photo, out);
+  return testing::read_bytes(out);
+}
+
+TEST_F(Studio, ChecksAPhotographOfTheWall) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const std::string place = "/projects/" + name;
+  browser.post(place + "/settings", kSmall);
+  browser.run(name, {{"step", "design"}});
+  const auto early = browser.post(place + "/run", json{{"step", "check"}});
+  EXPECT_THAT(error_of(early), HasSubstr("there is no photograph yet"));
+  const auto text = browser.post(place + "/photo", std::string("no picture"));
+  EXPECT_EQ(text->status, 400);
+  EXPECT_EQ(error_of(text), "the photograph: no picture can be read from it");
+  EXPECT_FALSE(browser.state(name)["photo"].get<bool>());
+  const fs::path lens = at("studio") / name / "lens-1";
+  browser.post(place + "/photo", photo_of(lens / "render.png", at("photo.png")));
+  EXPECT_TRUE(browser.state(name)["photo"].get<bool>());
+  EXPECT_TRUE(browser.state(name)["check"].is_null());
+  const json now = browser.run(name, {{"step", "check"}});
+  ASSERT_EQ(now["job"]["status"], "done") << now["job"];
+  EXPECT_EQ(now["job"]["command"], "lensforge check lens-1 photo --out lens-1/check");
+  EXPECT_FALSE(now["check"]["verdict"].get<std::string>().empty());
+  EXPECT_EQ(now["check"]["pictures"].size(), 3U);
+  EXPECT_EQ(browser.get(now["check"]["report"])->status, 200);
 }
 
 TEST_F(Studio, GoesBackToAnEarlierLensAndItsSettings) {

@@ -146,11 +146,12 @@ def check(lens=None, photos=(), out=None, *, progress=None, **options):
     lens: a saved Lens or a lens folder's path; photos: a path, or paths of several exposures; out:
     the folder to write; progress: as in design(). Returns a dict with "verdict", "causes" and what
     else check.json has. None of these three is needed with chart=, which writes a chart for the
-    wall and returns its "files". The options are those of lensforge check:
+    wall and returns its "files". With lamp_from= photos is empty, lens may be None (a pinhole), and
+    the dict has "lamp" and "next". The options are those of lensforge check:
     """
     if isinstance(photos, (str, bytes, os.PathLike)):
         photos = [photos]
-    given = {"PHOTO": [path_of(photo) for photo in photos]}
+    given = {"PHOTO": [path_of(photo) for photo in photos]} if photos else {}
     if lens is not None:
         given["LENS"] = _folder(lens)
     if out is not None:

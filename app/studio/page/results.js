@@ -11,9 +11,9 @@ function fileRow({ name, words, url, bytes }) {
   const short = name.split("/").pop();
   return make("li", {}, make("a", { href: url, download: short, "data-key": url, text: short }), " ", soft([words, bytesText(bytes)].filter(Boolean).join(", ")));
 }
-function reportRow(url) {
+function reportRow(url, words) {
   const link = make("a", { href: url, target: "_blank", rel: "noopener", "data-key": url, text: "Report" });
-  return make("li", {}, link, " ", soft("all figures of the part, opens in a new tab"));
+  return make("li", {}, link, " ", soft(`${words}, opens in a new tab`));
 }
 const fact = (name, value) => make("div", {}, make("dt", { text: name }), make("dd", { text: value }));
 
@@ -135,7 +135,24 @@ function showPart(state) {
   rebuild(find("warnings"), part.warnings, (list) => (list.length
     ? [make("h4", { text: list.length === 1 ? "A warning" : `${list.length} warnings` }), make("ul", {}, ...list.map((text) => make("li", { text })))] : []));
   rebuild(find("part-pictures"), part.pictures, (list) => list.map(figure));
-  rebuild(find("part-files"), [part.report, part.files], ([report, list]) => [...(report ? [reportRow(report)] : []), ...list.map(fileRow)]);
+  rebuild(find("part-files"), [part.report, part.files], ([report, list]) => [...(report ? [reportRow(report, "all figures of the part")] : []), ...list.map(fileRow)]);
+}
+
+// ---- A photograph of the wall ----
+async function checkPhoto() {
+  const photo = find("photo"), [file] = photo.files;
+  photo.value = ""; // So that the same file can be chosen again.
+  if (file && await act(4, "photo", file)) await act(4, "run", { step: "check" });
+}
+
+function showCheck(state) {
+  const check = state.check;
+  setHidden(find("check"), !check);
+  if (!check) return;
+  setText(find("check-verdict"), `${check.verdict}.`);
+  rebuild(find("check-more"), check.more, (list) => list.map((text) => make("li", { text: `Perhaps also: ${text}.` })));
+  rebuild(find("check-pictures"), check.pictures, (list) => list.map(figure));
+  rebuild(find("check-files"), check.report, (report) => [reportRow(report, "all that the photograph shows")]);
 }
 
 // ---- Commands ----

@@ -3,8 +3,8 @@
 
 const kQuick = 500; // ms between questions while something runs
 const kSlow = 2000;
-const kStepOfJob = { plan: 2, design: 3, view: 3, cam: 4, export: 4 };
-const kJobWords = { plan: "Plan", design: "Design", view: "View", cam: "Cut", export: "Export" };
+const kStepOfJob = { plan: 2, design: 3, view: 3, cam: 4, export: 4, check: 4 };
+const kJobWords = { plan: "Plan", design: "Design", view: "View", cam: "Cut", export: "Export", check: "Check" };
 const kActive = new Set(["waiting", "running", "stopping"]);
 const kStepNames = ["Picture", "Light and size", "Lens", "Part", "Machine"];
 
@@ -60,9 +60,10 @@ function showJob(state) {
     if (mine) showStrip(strip, job);
   }
   const busy = Boolean(job && kActive.has(job.status)), ready = Boolean(state.picture && state.picture.ready), bad = !state.light || Boolean(state.light.error);
-  const can = { plan: ready, design: ready && !bad, cam: Boolean(state.lens), export: Boolean(state.lens) };
+  const can = { plan: ready, design: ready && !bad, cam: Boolean(state.lens), export: Boolean(state.lens), check: Boolean(state.lens) && state.photo };
   for (const button of document.querySelectorAll("[data-run]")) button.disabled = busy || !can[button.dataset.run];
   find("view").disabled = busy;
+  find("photo").disabled = busy || !state.lens;
   const heard = job && `${state.name} ${job.step} ${job.status}`;
   if (heardJob !== heard && heardJob !== null && job) say(job.status === "running" ? `${kJobWords[job.step]} runs.` : jobText(job));
   heardJob = heard || "";
@@ -136,6 +137,7 @@ function render(state) {
   showJob(state);
   showLens(state);
   showPart(state);
+  showCheck(state);
   showMachineStep(state);
   showCommands(state.commands);
   showSteps(state);
@@ -276,6 +278,7 @@ function listenToButtons() {
     });
   }
   find("view").addEventListener("click", openView);
+  find("photo").addEventListener("change", checkPhoto);
   find("remove").addEventListener("click", removeProject);
   find("undo").addEventListener("click", () => act(3, "undo"));
   find("redo").addEventListener("click", () => act(3, "redo"));

@@ -211,6 +211,31 @@ await press('[data-run="export"]');
 await pause(300);
 check("the lens is exported", (await jobEnds(4)) === "done", await text('[data-job="4"]'));
 
+// ---- A photograph of the wall ----
+await (await tab.$("[data-photo]")).uploadFile(process.argv[1]);
+await has('[data-error="4"]', "no picture can be read");
+check("a photograph that is none is refused", true);
+const light = await tab.$eval('[data-lens-pictures] img[alt^="Light on the wall"]', async (node) => {
+  const bytes = await (await fetch(node.src)).blob();
+  return new Promise((resolve) => {
+    const reader = new FileReader();
+    reader.onload = () => resolve(reader.result);
+    reader.readAsDataURL(bytes);
+  });
+});
+const wall = await browser.newPage();
+await wall.setContent(`<body style="margin:0;background:#222"><img style="margin:90px;width:300px;opacity:0.9" src="${light}">`);
+const photo = `${shots || "."}/wall.png`;
+await wall.screenshot({ path: photo });
+await wall.close();
+await tab.bringToFront();
+await (await tab.$("[data-photo]")).uploadFile(photo);
+await has('[data-job="4"]', "Check");
+check("the photograph is checked", (await jobEnds(4)) === "done", await text('[data-job="4"]'));
+await shown("[data-check]");
+check("it says what is wrong, beside the pictures", (await text("[data-check-verdict]")).length > 20 && (await tab.$$("[data-check-pictures] img")).length === 3);
+await look("check");
+
 // ---- Machine ----
 await until(() => document.querySelector("[data-program]").value !== "");
 await fill("port", "/dev/ttyUSB7");
@@ -244,7 +269,7 @@ await until(() => ["done", "interrupted", "failed"].includes(document.querySelec
 check("the key Q ends the job", (await tab.$eval("[data-cut-state]", (n) => n.dataset.state)) === "interrupted");
 
 // ---- Commands, reload, keyboard ----
-for (const name of ["plan", "design view", "cam export", "send"]) check(`commands: ${name}`, (await text(`[data-commands="${name}"]`)).includes("lensforge "));
+for (const name of ["plan", "design view", "cam export check", "send"]) check(`commands: ${name}`, (await text(`[data-commands="${name}"]`)).includes("lensforge "));
 await tab.reload();
 await until((name) => document.querySelector("[data-name]").textContent === name, project);
 check("a reload comes back to the project", true);
@@ -263,7 +288,7 @@ for (let i = 0; i < 400; ++i) {
   reached.add(stop.id);
   if (!stop.visible && hiddenFocus++ < 5) console.log("      no visible focus:", stop.id);
 }
-for (const id of ["data-new", "crop-width", "tone-gamma", "data-original", "f-lamp", "data-scene", "data-run=plan", "data-run=design", "data-view", "data-run=cam", "format", "data-run=export", "program", "port"]) check(`Tab reaches ${id}`, reached.has(id));
+for (const id of ["data-new", "crop-width", "tone-gamma", "data-original", "f-lamp", "data-scene", "data-run=plan", "data-run=design", "data-view", "data-run=cam", "format", "data-run=export", "photo", "program", "port"]) check(`Tab reaches ${id}`, reached.has(id));
 check("every stop of Tab has a visible focus", hiddenFocus === 0, `${hiddenFocus} have none`);
 
 // ---- Removing ----

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <string>
 
 #include "cam/check/check_job.h"
 #include "cam/check/virtual_wall.h"
+#include "core/error.h"
 #include "core/temp_folder.h"
 
 namespace lensforge::next_lens_test {
@@ -94,6 +96,20 @@ TEST_F(NextLensTest, TheWorkshopsFileKeepsItsComments) {
   EXPECT_EQ(read_workshop(folder / "shop.toml"), learnt.workshop);
   write_workshop(learnt, once, "wall.jpg", folder / "shop.toml");
   EXPECT_EQ(read_bytes(folder / "shop.toml"), once);
+}
+
+/// A photograph may name more than a workshop can have.
+TEST_F(NextLensTest, AValueBeyondTheWorkshopsLimitsIsNotWritten) {
+  const TempFolder folder;
+  options_.workshop.process.finish.pitch_error = 0.018;
+  const NextLens learnt = next({found(Deviation::kPitch, 0.004, 1e-4)});
+  try {
+    write_workshop(learnt, "", "wall.jpg", folder / "shop.toml");
+    ADD_FAILURE() << "is written";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("finish.pitch_error"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "shop.toml"));
 }
 
 }  // namespace

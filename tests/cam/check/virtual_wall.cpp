@@ -24,34 +24,9 @@ namespace {
 
 constexpr double kMargin = 0.25;  ///< Of the wall beyond each side.
 
-/// A point of a disc of diameter 1, and its share of the light.
-struct LampPoint {
-  Eigen::Vector2d at{0.0, 0.0};
-  double share = 0.0;
-};
-
 /// Standard deviation along an axis of the Gaussian that each point stands for: that of an even
 /// part of the disc. Bare points would leave as many sharp pictures.
 constexpr double kPointWidth = 0.05;
-
-/// An evenly lit disc: three rings at Gauss's places for r², whose moments with the points' width
-/// are the disc's.
-std::vector<LampPoint> disc_points() {
-  constexpr int kAround = 8;
-  constexpr std::array<std::pair<double, double>, 3> kRings = {
-      {{0.11270166537925831, 5.0 / 18.0}, {0.5, 8.0 / 18.0}, {0.8872983346207417, 5.0 / 18.0}}};
-  const double narrower = std::sqrt(1.0 - 16.0 * kPointWidth * kPointWidth);
-  std::vector<LampPoint> points;
-  for (std::size_t ring = 0; ring < kRings.size(); ++ring) {
-    const auto& [square, share] = kRings[ring];
-    const double r = 0.5 * narrower * std::sqrt(square);
-    for (int k = 0; k < kAround; ++k) {
-      const double t = (k + 0.5 * static_cast<double>(ring % 2)) * 2.0 * std::numbers::pi / kAround;
-      points.push_back({{r * std::cos(t), r * std::sin(t)}, share / kAround});
-    }
-  }
-  return points;
-}
 
 /// The same lamp, but one of its points.
 OpticalSetup at_point(OpticalSetup setup, const Eigen::Vector2d& point) {
@@ -61,7 +36,7 @@ OpticalSetup at_point(OpticalSetup setup, const Eigen::Vector2d& point) {
     return setup;
   }
   auto& light = std::get<ParallelLight>(setup.lamp);
-  light.direction.head<2>() += point;
+  light.direction.head<2>() -= point;  // Light from the right goes to the left.
   light.direction.normalize();
   return setup;
 }
@@ -174,7 +149,27 @@ std::vector<BallPath> Workshop::paths(const Fault& fault) const {
   return paths;
 }
 
-WallLight Workshop::light(const Fault& fault) const {
+/// An evenly lit disc: three rings at Gauss's places for r², whose moments with the points' width
+/// are the disc's.
+std::vector<Workshop::LampPoint> Workshop::disc_points(double diameter) {
+  constexpr int kAround = 8;
+  constexpr std::array<std::pair<double, double>, 3> kRings = {
+      {{0.11270166537925831, 5.0 / 18.0}, {0.5, 8.0 / 18.0}, {0.8872983346207417, 5.0 / 18.0}}};
+  const double narrower = std::sqrt(1.0 - 16.0 * kPointWidth * kPointWidth);
+  std::vector<LampPoint> points;
+  for (std::size_t ring = 0; ring < kRings.size(); ++ring) {
+    const auto& [square, share] = kRings[ring];
+    const double r = 0.5 * diameter * narrower * std::sqrt(square);
+    for (int k = 0; k < kAround; ++k) {
+      const double t = (k + 0.5 * static_cast<double>(ring % 2)) * 2.0 * std::numbers::pi / kAround;
+      points.push_back({{r * std::cos(t), r * std::sin(t)}, share / kAround});
+    }
+  }
+  return points;
+}
+
+WallLight Workshop::lit_by(const std::vector<LampPoint>& points, double spread,
+                           const Fault& fault) const {
   const OpticalSetup wall = seen_wall(lens_.setup, fault);
   PolishModel polish = options_.workshop.polish;
   polish.sigma *= 1.0 + fault.sigma;
@@ -185,20 +180,16 @@ WallLight Workshop::light(const Fault& fault) const {
   setup.grid = lens_grid(wall.lens_size, sample_spacings(options_, lens_.setup, setup_.passes()));
   setup.tile = 100000;
   std::vector<double> sum(static_cast<std::size_t>(wall.pixels.prod()), 0.0);
-  const double width = wall.extent.width * (1.0 + fault.lamp);
-  const std::vector<LampPoint> points =
-      width > 0.0 ? disc_points() : std::vector<LampPoint>{{{0.0, 0.0}, 1.0}};
   for (const LampPoint& point : points) {
-    setup.optics = at_point(wall, width * point.at);
+    setup.optics = at_point(wall, point.at);
     const FluxPicture picture = render_field(part, setup, executor_, {});
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += point.share * picture.flux[i];
   }
   const double pixel = wall.image_size.x() / wall.pixels.x();
-  if (width > 0.0) {
+  if (spread > 0.0) {
     const auto place = lamp_place(wall.lamp);
-    const double angle = width / (place ? place->norm() : 1.0);
-    sum = gaussian(sum, wall.pixels.x(), wall.pixels.y(),
-                   kPointWidth * angle * wall.focal_length / pixel);
+    const double angle = spread / (place ? place->norm() : 1.0);
+    sum = gaussian(sum, wall.pixels.x(), wall.pixels.y(), angle * wall.focal_length / pixel);
   }
   if (fault.haze > 0.0) {
     const std::vector<double> wide =
@@ -210,6 +201,60 @@ WallLight Workshop::light(const Fault& fault) const {
   std::transform(sum.begin(), sum.end(), light.light.values().begin(),
                  [&](double value) { return static_cast<float>(even * value); });
   return light;
+}
+
+WallLight Workshop::light(const Fault& fault) const {
+  const double width = lens_.setup.extent.width * (1.0 + fault.lamp);
+  if (width == 0.0) return lit_by({{{0.0, 0.0}, 1.0}}, 0.0, fault);
+  return lit_by(disc_points(width), kPointWidth * width, fault);
+}
+
+WallLight Workshop::light(const Fault& fault, const DrawnLamp& lamp) const {
+  const double cell = lamp.width / lamp.light.columns();
+  const double total = lamp.light.total();
+  std::vector<LampPoint> points;
+  for (int r = 0; r < lamp.light.rows(); ++r) {
+    for (int c = 0; c < lamp.light.columns(); ++c) {
+      const double light = lamp.light.at(c, r);
+      if (light == 0.0) continue;
+      points.push_back({cell * Eigen::Vector2d(c + 0.5 - 0.5 * lamp.light.columns(),
+                                               0.5 * lamp.light.rows() - r - 0.5),
+                        light / total});
+    }
+  }
+  return lit_by(points, cell / std::sqrt(12.0), fault);
+}
+
+WallLight pinhole_light(const DrawnLamp& lamp, double distance, double diameter) {
+  constexpr int kSide = 400;
+  constexpr int kRings = 8;
+  const double width = 2.0 * lamp.width * distance;
+  WallLight wall{Image(kSide, kSide), {width, width}};
+  const auto seen = [&](const Eigen::Vector2d& slope) {
+    // The viewer has the lamp behind: its right is on the right, its top below.
+    const Eigen::Vector2d share = slope / lamp.width;
+    const double c = (share.x() + 0.5) * lamp.light.columns();
+    const double r = (share.y() + 0.5) * lamp.light.rows();
+    const int row = lamp.light.rows() - 1 - static_cast<int>(std::floor(r));
+    const int column = static_cast<int>(std::floor(c));
+    const bool beside =
+        column < 0 || row < 0 || column >= lamp.light.columns() || row >= lamp.light.rows();
+    return beside ? 0.0 : static_cast<double>(lamp.light.at(column, row));
+  };
+  for (int r = 0; r < kSide; ++r) {
+    for (int c = 0; c < kSide; ++c) {
+      const Eigen::Vector2d at(width * ((c + 0.5) / kSide - 0.5),
+                               width * ((r + 0.5) / kSide - 0.5));
+      double sum = 0.0;
+      for (int k = 0; k < kRings * kRings; ++k) {
+        const double radius = 0.5 * diameter * std::sqrt((k + 0.5) / (kRings * kRings));
+        const double turn = 2.4 * k;  // The golden angle.
+        sum += seen((at + radius * Eigen::Vector2d(std::cos(turn), std::sin(turn))) / distance);
+      }
+      wall.light.at(c, r) = static_cast<float>(sum / (kRings * kRings));
+    }
+  }
+  return wall;
 }
 
 namespace {

@@ -59,6 +59,12 @@ struct WallLight {
 WallLight::Sheet printed_chart(const std::filesystem::path& drawing, double bar,
                                const Eigen::Vector2d& middle, double turn = 0.0);
 
+/// A lamp that is no disc.
+struct DrawnLamp {
+  Image light;         ///< As seen from the lens, its y up; square.
+  double width = 0.0;  ///< Full angle, rad; of a lamp with a place mm.
+};
+
 /// Cuts a lens once and shows what parts with faults project.
 class Workshop {
  public:
@@ -66,8 +72,19 @@ class Workshop {
   Workshop(const Lens& lens, const CamOptions& options, const Executor& executor);
 
   [[nodiscard]] WallLight light(const Fault& fault) const;
+  /// In the light of another lamp than the lens's.
+  [[nodiscard]] WallLight light(const Fault& fault, const DrawnLamp& lamp) const;
 
  private:
+  /// A place on the lamp as seen from the lens, to the right and up, and its share of the light.
+  struct LampPoint {
+    Eigen::Vector2d at{0.0, 0.0};  ///< rad or mm
+    double share = 0.0;
+  };
+  /// @param spread  standard deviation along an axis of the Gaussian that each point stands for.
+  [[nodiscard]] WallLight lit_by(const std::vector<LampPoint>& points, double spread,
+                                 const Fault& fault) const;
+  [[nodiscard]] static std::vector<LampPoint> disc_points(double diameter);
   [[nodiscard]] std::vector<BallPath> paths(const Fault& fault) const;
 
   const Lens& lens_;
@@ -76,6 +93,10 @@ class Workshop {
   CutSetup setup_;
   std::vector<std::pair<double, std::vector<RasterRow>>> rows_;  ///< By the ball's radius.
 };
+
+/// The image that a pinhole throws of a lamp on a dark wall, twice as wide as it.
+/// @param lamp  with an angle. @param distance  from hole to wall, mm. @param diameter  mm
+WallLight pinhole_light(const DrawnLamp& lamp, double distance, double diameter);
 
 /// A camera before the wall.
 struct Camera {
