@@ -429,7 +429,7 @@ LampSearch::LampSearch(const Lens& lens, const WallModel& model, const Photograp
       sharp_(wall_picture(model, Deviations::Zero())),
       executor_(executor),
       control_(control) {
-  constexpr double kSeenPerPixel = 2.0;  // Pixels of the photograph per pixel of the picture.
+  constexpr double kFinePerPixel = 2.0;  // Pixels of the photograph per pixel of the picture.
   constexpr double kLeastPixels = 2.0;   // Width of a first guess, in pixels of the picture.
   constexpr double kAround = 3.0;        // Width of the first grid, in widths of that.
   const OpticalSetup& setup = lens.setup;
@@ -437,7 +437,7 @@ LampSearch::LampSearch(const Lens& lens, const WallModel& model, const Photograp
   const double own = std::max(lamp_angle(setup), kLeastPixels * to_wall_.pixel() / away);
   view_ = find_by_any_lamp(photo, model, own);
   first_ = kAround * own * away;
-  photo_ = shrunk(photo, pixels_across(photo, view_) / (kSeenPerPixel * setup.pixels.x()));
+  photo_ = shrunk(photo, pixels_across(photo, view_) / (kFinePerPixel * setup.pixels.x()));
   seen_pixel_ = to_wall_.pixel() * setup.pixels.x() / pixels_across(photo_, view_);
 }
 
@@ -501,7 +501,7 @@ LampSearch::Found LampSearch::found(const LampGrid& grid, const Eigen::VectorXd&
 
 LampPicture LampSearch::run() {
   constexpr double kReach = 1.2;
-  constexpr int kMostRounds = 8;
+  constexpr int kMostGrids = 8;
   constexpr double kSame = 0.05;  // Of the grid's width.
   constexpr double kWider = 1.5;  // Per round, until the grid holds the lamp.
   bool whole = false;
@@ -518,7 +518,7 @@ LampPicture LampSearch::run() {
     now.lamp.residual = (pixels.shown(view_, seen) - pixels.seen()).norm() /
                         std::sqrt(static_cast<double>(pixels.size()));
     const bool same = std::abs(now.next.width - grid.width) < kSame * grid.width;
-    if (round == kMostRounds || (same && whole)) return now.lamp;
+    if (round == kMostGrids || (same && whole)) return now.lamp;
     // Cells grow until they hold the whole lamp, and then close around it.
     whole = whole || now.whole;
     grid = whole ? now.next : grid_of(kWider * grid.width, grid.middle);
