@@ -59,7 +59,7 @@ std::string spectrum_text(const Spectrum& spectrum) {
   for (std::size_t k = 0; k < spectrum.wavelengths.size(); ++k) {
     if (k > 0) text += ',';
     text += shortest_text(spectrum.wavelengths[k]);
-    if (spectrum.powers.empty()) continue;
+    if (k >= spectrum.powers.size()) continue;  // Also of a wrong spectrum, which a message names.
     text += ':';
     text += shortest_text(spectrum.powers[k]);
   }
