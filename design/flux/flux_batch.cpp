@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Vectors are never passed: everything that takes them is inlined.
-#pragma GCC diagnostic ignored "-Wpsabi"
 #include "design/flux/flux_batch.h"
 
 #include <cmath>
