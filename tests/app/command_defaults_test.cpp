@@ -6,6 +6,7 @@
 #include "app/commands/send_command.h"
 #include "app/commands/settings.h"
 #include "cam/plan/cam_options.h"
+#include "core/schema/description.h"
 #include "core/temp_folder.h"
 #include "design/setup/design_options.h"
 

@@ -8,6 +8,7 @@
 #include "cam/coupon/coupon.h"
 #include "cam/plan/cam_options.h"
 #include "core/error.h"
+#include "core/schema/description.h"
 #include "core/text/number_text.h"
 #include "design/reflect/input.h"
 #include "design/setup/design_options.h"

@@ -14,6 +14,7 @@
 #include "core/image/image.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/optical_setup.h"
+#include "core/schema/description.h"
 #include "core/temp_folder.h"
 #include "core/test_meshes.h"
 #include "design/ray_tracer.h"

@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/member_count.h"
 #include "core/mesh/surface_mesh.h"
+#include "core/schema/description.h"
 #include "core/temp_folder.h"
 #include "design/setup/design_options.h"
 #include "design/test_setups.h"
