@@ -18,8 +18,8 @@
 #include "core/lens/setup_json.h"
 #include "core/optics/material.h"
 #include "core/optics/picture_blur.h"
-#include "core/schema/json.h"
 #include "core/schema/description.h"
+#include "core/schema/json.h"
 #include "core/text/words.h"
 #include "design/schedule/levels.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/two_faces.h"
-
 #include <Eigen/Geometry>
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SparseCore>
@@ -17,6 +15,7 @@
 #include "core/optics/light_source.h"
 #include "core/optics/screen.h"
 #include "core/spline/control_net.h"
+#include "design/schedule/two_faces.h"
 
 namespace lensforge {
 namespace {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/optimize/grid_preconditioner.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
 #include <cmath>
 #include <numbers>
 
+#include "design/optimize/grid_preconditioner.h"
 #include "design/random_input.h"
 
 namespace lensforge {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/render/source_picture.h"
-
 #include <gtest/gtest.h>
 
 #include "core/mesh/surface_mesh.h"
+#include "design/render/source_picture.h"
 
 namespace lensforge::testing {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "design/schedule/two_faces.h"
-
 #include <gtest/gtest.h>
 
 #include "core/optics/light_source.h"
@@ -8,6 +6,7 @@
 #include "core/optics/screen.h"
 #include "core/spline/control_net.h"
 #include "design/random_input.h"
+#include "design/schedule/two_faces.h"
 #include "design/test_setups.h"
 
 namespace lensforge {
