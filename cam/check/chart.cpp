@@ -278,7 +278,8 @@ class DarkShapes {
     }
     std::vector<Eigen::Vector2d> corners;
     for (std::size_t line = 0; line < 2 * ends.size(); ++line) {
-      const double y = row + static_cast<double>((line + 1) / 2);
+      const std::size_t below = (line + 1) / 2;
+      const double y = row + static_cast<double>(below);
       corners.emplace_back(ends[line / 2].first, y);
       corners.emplace_back(ends[line / 2].second + 1, y);
     }
@@ -389,9 +390,11 @@ class SeenCells {
     std::array<double, 2> levels{};  // Of the white around, and of the mark's rim.
     for (int k = 0; k < kSide * kSide; ++k) {
       double& cell = cells_[static_cast<std::size_t>(k)];
+      const Eigen::Vector2i corner(k % kSide, k / kSide);
       for (int part = 0; part < kParts * kParts; ++part) {
-        const Eigen::Vector2d at(k % kSide + 0.3 + 0.2 * (part % kParts),
-                                 k / kSide + 0.3 + 0.2 * (part / kParts));
+        const Eigen::Vector2i inside(part % kParts, part / kParts);
+        const Eigen::Vector2d at =
+            (corner.cast<double>() + 0.2 * inside.cast<double>()).array() + 0.3;
         cell += bilinear(light, mapped(map, at)) / (kParts * kParts);
       }
       const int ring = ring_of(k);
