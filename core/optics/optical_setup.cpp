@@ -45,7 +45,12 @@ Spectrum parse_spectrum(const std::string& text, const std::string& name) {
   }
   std::string commas = text;
   std::replace(commas.begin(), commas.end(), ':', ',');
-  const std::vector<double> numbers = parse_numbers(commas, name, count + colons);
+  std::vector<double> numbers;
+  try {
+    numbers = parse_numbers(commas, name, count + colons);
+  } catch (const InputError&) {
+    refuse();
+  }
   Spectrum spectrum;
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     (colons > 0 && i % 2 == 1 ? spectrum.powers : spectrum.wavelengths).push_back(numbers[i]);

@@ -225,8 +225,10 @@ TEST(Fringe, WavelengthsAreReadOrRefusedInOneLine) {
   EXPECT_EQ(led.wavelengths, (std::vector<double>{450.0, 550.0, 650.0}));
   EXPECT_EQ(led.powers, (std::vector<double>{0.6, 1.0, 0.8}));
   EXPECT_EQ(spectrum_text(led), "450:0.6,550:1,650:0.8");
-  for (const char* text : {"", "550", "650,550", "550,550", "300,550", "550,800", "1,2,3,4,5,6",
-                           "450:1,550", "450:1,550:0", "450:1,550:-1", "450:1:550"}) {
+  EXPECT_EQ(parse_spectrum("550", "--wavelengths").wavelengths, (std::vector<double>{550.0}));
+  for (const char* text :
+       {"", "red", "350", "650,550", "550,550", "300,550", "550,800", "1,2,3,4,5,6", "450:1,550",
+        "450:1,550:0", "450:1,550:-1", "450:1:550"}) {
     EXPECT_THAT(message_of<InputError>([&] { (void)parse_spectrum(text, "--wavelengths"); }),
                 EndsWith("450,550,650 works"));
   }

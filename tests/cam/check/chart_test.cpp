@@ -62,7 +62,7 @@ class ChartTest : public ::testing::Test {
 /// At any angle, up to 30° beside the wall's normal, distorted, in dim light: the corners are those
 /// of one perspective to a tenth of a pixel.
 TEST_F(ChartTest, IsFoundFromAnySide) {
-  for (const std::uint64_t seed : {1, 5}) {
+  for (const std::uint64_t seed : {1U, 5U}) {
     SCOPED_TRACE(seed);
     const double turn = std::numbers::pi / 3.0 * static_cast<double>(seed);
     const auto chart = find_chart(shot({sheet({4.1, 0.1}, turn)}, camera(seed)), "wall.jpg");
