@@ -410,7 +410,7 @@ INSTANTIATE_TEST_SUITE_P(
                  {"--wavelengths 550,781: must be", "from 380 to 780"}},
         BadLight{"ColorsByName",
                  {"--wavelengths", "red,blue"},
-                 {"--wavelengths red,blue: must be 2 finite numbers"}},
+                 {"--wavelengths red,blue: must be 1 to 5 rising numbers"}},
         BadLight{"PowerOfOneColorOnly",
                  {"--wavelengths", "450:1,550"},
                  {"--wavelengths 450:1,550: must be", "at each or at none"}},
