@@ -85,7 +85,7 @@ TEST_F(Usage, MissingArgumentsAreRefused) {
 TEST_F(Usage, UnknownOptionIsRefused) {
   expect_option_refused({"--widht", "5"}, {"--widht", "did you mean --width?"});
   expect_option_refused({"--widht=5"}, {"--widht=5", "did you mean --width?"});
-  expect_option_refused({"--colour"}, {"--colour", "design --help lists the options"});
+  expect_option_refused({"--hologram"}, {"--hologram", "design --help lists the options"});
 }
 
 TEST_F(Usage, SecondValueIsRefused) {

@@ -204,7 +204,7 @@ WallLight Workshop::lit_by(const std::vector<LampPoint>& points, double spread,
 }
 
 WallLight Workshop::light(const Fault& fault) const {
-  const double width = lens_.setup.extent.width * (1.0 + fault.lamp);
+  const double width = seen_wall(lens_.setup, fault).extent.width * (1.0 + fault.lamp);
   if (width == 0.0) return lit_by({{{0.0, 0.0}, 1.0}}, 0.0, fault);
   return lit_by(disc_points(width), kPointWidth * width, fault);
 }
