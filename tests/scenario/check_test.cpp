@@ -98,9 +98,9 @@ TEST_F(ChartForTheWall, NeedsAPlace) {
 }
 
 TEST_F(ChartForTheWall, WithoutItACheckNeedsItsFiles) {
-  expect_no_chart({}, {"LENS: is missing"});
-  expect_no_chart({path("lens")}, {"PHOTO: is missing"});
-  expect_no_chart({path("lens"), path("wall.png")}, {"--out: is missing"});
+  expect_no_chart({}, {"--out is required"});
+  expect_no_chart({path("lens"), "--out", path("check")}, {"PHOTO is required"});
+  expect_no_chart({"--out", path("check")}, {"LENS is required"});
 }
 
 }  // namespace

@@ -55,6 +55,16 @@ TracedLight::TracedLight(const json& lens, const std::string& folder)
   }
   if (mirror_) return;
   ior_ = lens.at("ior");
+  if (lens.contains("spectrum")) {
+    const json& spectrum = lens.at("spectrum");
+    const json& colors = spectrum.at("wavelengths_nm");
+    refuse_unless(colors.size() == 1, "light of several colours");
+    // Cauchy's two terms through the lines d, F and C.
+    const auto per_square = [](double nm) { return 1.0 / (nm * nm); };
+    const double bend = (ior_ - 1.0) / spectrum.at("abbe").get<double>() /
+                        (per_square(486.13) - per_square(656.27));
+    ior_ += bend * (per_square(colors.at(0)) - per_square(587.56));
+  }
   const json& front = lens.at("front");
   if (front.at("type") == "sphere") {
     radius_ = front.at("radius");
