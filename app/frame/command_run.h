@@ -56,8 +56,8 @@ class OutputFolder {
 
  private:
   std::filesystem::path path_;
-  std::vector<std::filesystem::path>
-      missing_;  ///< Folders above that did not exist, deepest first.
+  /// Folders above that did not exist, deepest first.
+  std::vector<std::filesystem::path> missing_;
   MadeFolder folder_;
 };
 

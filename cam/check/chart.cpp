@@ -13,6 +13,8 @@
 #include "cam/coupon/coupon_fit.h"
 #include "core/error.h"
 #include "core/image/color.h"
+#include "core/mesh/surface_mesh.h"
+#include "core/optics/outline.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
 #include "core/text/version.h"
@@ -26,8 +28,8 @@ constexpr double kMark = 0.4;                   ///< Side of a mark, bars.
 constexpr double kCell = kMark / (kCells + 2);  ///< A black cell is around the code.
 
 struct Mark {
-  std::uint16_t
-      code;  ///< Its cells row by row from the upper left one, the first is bit 15; 1: white.
+  /// Its cells row by row from the upper left one, the first is bit 15; 1: white.
+  std::uint16_t code;
   Eigen::Vector2d at;  ///< Its upper left corner, bars.
 };
 
@@ -132,10 +134,6 @@ Eigen::Matrix3d perspective_of(const std::vector<Eigen::Vector2d>& from,
   return map;
 }
 
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 /// Half widths of the windows whose means are thresholds: light may change from place to place, and
 /// a window must be wider than a mark's cells. Pixels.
 constexpr std::array<int, 4> kWindows = {6, 14, 32, 72};
@@ -198,15 +196,6 @@ std::vector<Eigen::Vector2d> hull_of(const std::vector<Eigen::Vector2d>& sorted)
   return hull;
 }
 
-template <class Points>
-double area_of(const Points& points) {
-  double area = 0.0;
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    area += 0.5 * cross(points[k], points[(k + 1) % points.size()]);
-  }
-  return area;
-}
-
 /// The hull's quadrilateral between its longest diagonal and the places farthest from that; none if
 /// it is another shape, or small.
 std::optional<Quad> quad_of(const std::vector<Eigen::Vector2d>& hull) {
@@ -226,7 +215,7 @@ std::optional<Quad> quad_of(const std::vector<Eigen::Vector2d>& hull) {
   for (std::size_t k = 0; k < 4; ++k) {
     if ((quad[(k + 1) % 4] - quad[k]).norm() < kShortest) return std::nullopt;
   }
-  if (area_of(quad) < kSame * area_of(hull)) return std::nullopt;
+  if (polygon_area({quad.begin(), quad.end()}) < kSame * polygon_area(hull)) return std::nullopt;
   return quad;
 }
 

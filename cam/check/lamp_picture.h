@@ -31,8 +31,7 @@ struct Pinhole {
 /// side. The hole's own blur stays in it.
 /// @return with the width as an angle, rad.
 /// @throw InputError naming the photograph: too dark, clipped, no lamp, too small, or it touches
-/// the
-///        border.
+///        the border.
 LampPicture lamp_by_pinhole(const Photograph& photo, const Pinhole& pinhole);
 
 /// The lamp behind a lens: the kernel k ≥ 0 that makes its photograph of the part's forecast in the

@@ -87,9 +87,6 @@ class FacetRaysOn {
   void add_normal_bar(const Exec& /*executor*/, double* /*sum*/) {}
 };
 
-// Smooth and spline model: every vertex sends one ray by its normal, and image
-// triangles share corners.
-
 /// Sums `adjoint(i, ray, &deposited)` over all faces: rays are traced and deposit_adjoint() of
 /// their images computed several at a time. Everything is inlined: passing derivatives through
 /// memory takes a third of the time.
@@ -131,6 +128,9 @@ FinishedSum<N> pending_sum(const Executor& executor, const char* kernel, std::in
   if (adjoint.o.goal.is_picture()) return sum_in_batches<N>(executor, kernel, count, adjoint);
   return {parallel_sum<N>(executor, kernel, count, adjoint)};
 }
+
+// Smooth and spline model: every vertex sends one ray by its normal, and image
+// triangles share corners.
 
 /// The kernels' part, and the arrays that they share. @pre landing is up to date.
 struct SmoothRays {
