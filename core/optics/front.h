@@ -149,6 +149,9 @@ class FrontSurface {
         per_mm_y_((rows_ - 1) / front.size.y()) {}
   explicit FrontSurface(const Front& front)
       : FrontSurface(std::visit([](const auto& one) { return FrontSurface(one); }, front)) {}
+  // Their coefficients would end with the expression.
+  explicit FrontSurface(HeightFront&&) = delete;
+  explicit FrontSurface(Front&&) = delete;
 
   [[nodiscard]] LF_HD bool is_height_map() const { return coefficients_ != nullptr; }
   /// The coefficients of a height map; empty for a sphere.

@@ -41,7 +41,8 @@ TEST(HeightFront, GoesThroughItsSamplesTheTopRowAtTheGreatestY) {
   for (int k = 0; k < 20; ++k) {
     grid.heights.push_back(static_cast<float>(random.between(-2.0, 0.0)));
   }
-  const FrontSurface front(HeightFront{std::make_shared<HeightSpline>(grid), kSize});
+  const HeightFront map{std::make_shared<HeightSpline>(grid), kSize};
+  const FrontSurface front(map);
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 5; ++column) {
       const Eigen::Vector2d at(kSize.x() * column / 4.0, kSize.y() * (3 - row) / 3.0);
@@ -52,7 +53,8 @@ TEST(HeightFront, GoesThroughItsSamplesTheTopRowAtTheGreatestY) {
 }
 
 TEST(HeightFront, ItsDerivativesAreThoseOfItsHeights) {
-  const FrontSurface front(height_front(kSize, {40, 33}, wave));
+  const HeightFront map = height_front(kSize, {40, 33}, wave);
+  const FrontSurface front(map);
   constexpr double kStep = 1e-4;
   Random random(2);
   for (int k = 0; k < 500; ++k) {
@@ -76,7 +78,8 @@ TEST(HeightFront, ItsDerivativesAreThoseOfItsHeights) {
 
 TEST(HeightFront, ItsSecondDerivativesAreContinuousAlsoAtItsEdges) {
   const GridShape shape{16, 13};  // Knots 2 mm apart.
-  const FrontSurface front(height_front(kSize, shape, wave));
+  const HeightFront map = height_front(kSize, shape, wave);
+  const FrontSurface front(map);
   constexpr double kBeside = 1e-9;
   for (int knot = -3; knot <= shape.columns + 2; ++knot) {
     const Eigen::Vector2d at(2.0 * knot, 7.3);
@@ -87,7 +90,8 @@ TEST(HeightFront, ItsSecondDerivativesAreContinuousAlsoAtItsEdges) {
 }
 
 TEST(HeightFront, BeyondItsEdgesItsCurvatureFallsToNothingWithinOneSample) {
-  const FrontSurface front(height_front(kSize, {16, 13}, wave));
+  const HeightFront map = height_front(kSize, {16, 13}, wave);
+  const FrontSurface front(map);
   const double edge = front.at({30.0, 7.3}).bend[0];
   ASSERT_GT(std::abs(edge), 1e-3);
   EXPECT_NEAR(front.at({31.0, 7.3}).bend[0], 0.5 * edge, 1e-12);
@@ -100,8 +104,9 @@ TEST(HeightFront, BeyondItsEdgesItsCurvatureFallsToNothingWithinOneSample) {
 /// Largest errors of height, slope and curvature against the sphere that a map samples.
 Eigen::Array3d errors_of(const SphericalFront& sphere, const GridShape& shape) {
   const FrontSurface exact(sphere);
-  const FrontSurface map(
-      height_front(kSize, shape, [&](const Eigen::Vector2d& at) { return exact.height(at); }));
+  const HeightFront samples =
+      height_front(kSize, shape, [&](const Eigen::Vector2d& at) { return exact.height(at); });
+  const FrontSurface map(samples);
   Random random(3);
   Eigen::Array3d worst = Eigen::Array3d::Zero();
   for (int k = 0; k < 3000; ++k) {
@@ -250,7 +255,8 @@ TEST(FrontPlacement, TheLowestPointIsThatOfManyPlaces) {
       const FrontSurface surface(front);
       double least = 1e9;
       for (int k = 0; k < 351 * 181; ++k) {
-        const Eigen::Vector2d at(k % 351 * 0.1, k / 351 * 0.1);
+        const int row = k / 351;
+        const Eigen::Vector2d at(0.1 * (k % 351), 0.1 * row);
         least = std::min(least, surface.height(box.min() + at));
       }
       EXPECT_NEAR(lowest_of(front, box), least, 1e-9);

@@ -156,7 +156,7 @@ inline Eigen::Vector3d reference_incident(const OpticalSetup& setup, const Eigen
     return refract_by_angles(way.normalized(), Eigen::Vector3d::UnitZ(), 1.0 / setup.ior);
   };
   const auto place = lamp_place(setup.lamp);
-  const Eigen::Vector3d straight = way_to(setup, p);
+  Eigen::Vector3d straight = way_to(setup, p);
   if (!traits(setup.body).transmits) return straight;
   if (!place) return inside(straight);
   const Eigen::Vector3d& from = *place;

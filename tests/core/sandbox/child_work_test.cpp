@@ -30,7 +30,8 @@ std::string failure_of(const Work& work, const ChildLimits& limits = {}) {
 TEST(ChildWork, ResultIsWhatTheWorkReturns) {
   EXPECT_EQ(run([](const RunControl&) { return "seven"; }), "seven");
   EXPECT_EQ(run([](const RunControl&) { return ""; }), "");
-  std::string large(20'000'000, 'a');
+  std::string large;
+  large.resize(20'000'000, 'a');
   large.back() = 'z';
   EXPECT_TRUE(run([&](const RunControl&) { return large; }) == large);
 }
@@ -59,15 +60,19 @@ TEST(ChildWork, CrashesAreFailures) {
               HasSubstr("without a result"));
 }
 
-TEST(ChildWork, MemoryAndTimeAreLimited) {
+TEST(ChildWork, MemoryIsLimited) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "with the address sanitizer, which maps terabytes, children have no limit";
+#endif
   const auto hoard = [](const RunControl&) {
     std::vector<std::string> kept;
     while (kept.size() < 2000) kept.emplace_back(std::size_t{1} << 20, 'x');
     return std::string();
   };
-  // A sanitizer's allocator ends the process instead of throwing.
-  EXPECT_THAT(failure_of(hoard, {.memory_bytes = 2e8}),
-              ::testing::AnyOf(HasSubstr("memory"), HasSubstr("without a result"), "crashed"));
+  EXPECT_THAT(failure_of(hoard, {.memory_bytes = 2e8}), HasSubstr("memory"));
+}
+
+TEST(ChildWork, TimeIsLimited) {
   const auto spin = [](const RunControl&) {
     for (volatile int i = 0; i >= 0;) i = (i + 1) % 1000;
     return std::string();
