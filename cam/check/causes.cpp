@@ -204,7 +204,7 @@ DeviationFit::Tangents DeviationFit::tangents() const {
 DeviationFit::Tangents DeviationFit::Tangents::beyond_view() const {
   Eigen::MatrixXd basis = view;
   for (Eigen::Index k = 0; k < basis.cols(); ++k) basis.col(k).normalize();
-  basis = Eigen::HouseholderQR<Eigen::MatrixXd>(basis).householderQ() *
+  basis = basis.colPivHouseholderQr().householderQ() *
           Eigen::MatrixXd::Identity(basis.rows(), basis.cols());
   Tangents rest = *this;
   rest.columns -= basis * (basis.transpose() * columns);
@@ -346,7 +346,8 @@ class JointTest {
     for (const Deviation d : causes) weights[index_of(d)] += prior_[index_of(d)];
     Eigen::MatrixXd matrix = products_ / variance;
     matrix.diagonal() += weights.cwiseInverse();
-    const Eigen::MatrixXd inverse = matrix.inverse();
+    const Eigen::MatrixXd inverse =
+        matrix.ldlt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
     Estimate result;
     result.steps = inverse * along_ / variance;
     result.variances = inverse.diagonal();

@@ -333,7 +333,9 @@ std::optional<Line> side_line(const Image& light, const Eigen::Vector2d& from,
   for (const Eigen::Vector2d& p : places) mean += p / static_cast<double>(places.size());
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
   for (const Eigen::Vector2d& p : places) spread += (p - mean) * (p - mean).transpose();
-  return Line{mean, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(1)};
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
+  axes.computeDirect(spread);
+  return Line{mean, axes.eigenvectors().col(1)};
 }
 
 /// The same quadrilateral with the corners of its sides' lines.
@@ -612,6 +614,18 @@ double corner_error(const SeenChart& chart, const Image& photo) {
   return std::max(std::sqrt(square / static_cast<double>(free)), kLeast);
 }
 
+namespace {
+
+/// The orthogonal factor of a matrix's polar decomposition: a reflection where it mirrors.
+Eigen::Matrix2d nearest_turn(const Eigen::Matrix2d& map) {
+  const double side = map.determinant() < 0.0 ? -1.0 : 1.0;
+  const Eigen::Vector2d first(map(0, 0) + side * map(1, 1), map(1, 0) - side * map(0, 1));
+  const Eigen::Vector2d unit = first.normalized();
+  return (Eigen::Matrix2d() << unit.x(), -side * unit.y(), unit.y(), side * unit.x()).finished();
+}
+
+}  // namespace
+
 Eigen::VectorXd view_by_chart(const SeenChart& chart, const Image& photo,
                               const Eigen::Vector2d& place, const Eigen::Vector2d& at,
                               const Eigen::Matrix2d& turn) {
@@ -619,8 +633,7 @@ Eigen::VectorXd view_by_chart(const SeenChart& chart, const Image& photo,
   const Eigen::Vector3d seen = map * place.homogeneous();
   const Eigen::Matrix2d slope =
       (map.topLeftCorner<2, 2>() - seen.hnormalized() * map.block<1, 2>(2, 0)) / seen.z();
-  const Eigen::JacobiSVD<Eigen::Matrix2d> svd(slope, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix2d upright = svd.matrixV() * svd.matrixU().transpose();
+  const Eigen::Matrix2d upright = nearest_turn(slope).transpose();
   const Eigen::Matrix2d to_wall =
       (2.0 * chart.bar * turn * upright).array().colwise() / chart.picture.array();
   map.topRows<2>() = to_wall * map.topRows<2>();

@@ -435,7 +435,9 @@ struct Moments {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
 
   [[nodiscard]] Eigen::Matrix2d root() const {
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).operatorSqrt();
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
+    axes.computeDirect(covariance);
+    return axes.operatorSqrt();
   }
 };
 

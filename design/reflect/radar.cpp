@@ -242,7 +242,8 @@ std::vector<CurvedFace> curved_faces(const SurfaceMesh& mesh, const std::vector<
       const Vector3d n = area_normal(mesh, k).normalized();
       const Vector3d u = n.unitOrthogonal();
       const Vector3d v = n.cross(u);
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> principal(second_form(
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> principal;
+      principal.computeDirect(second_form(
           mesh.corners(k), {normals.col(corner[0]), normals.col(corner[1]), normals.col(corner[2])},
           u, v));
       const ParabolicShares one = shares_of(principal.eigenvalues()[0], wave_number);
