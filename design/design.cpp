@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,11 +15,15 @@
 #include "core/error.h"
 #include "core/image/color.h"
 #include "core/io/checkpoint_file.h"
+#include "core/lens/optical_surface.h"
 #include "core/lens/surface_check.h"
+#include "core/lens/surface_field.h"
+#include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
 #include "core/optics/picture_blur.h"
 #include "core/optics/polish_transfer.h"
 #include "core/spline/control_net.h"
+#include "core/text/number_text.h"
 #include "design/render.h"
 #include "design/render/source_picture.h"
 #include "design/schedule/checkpoint.h"
@@ -26,6 +31,7 @@
 #include "design/schedule/rounds.h"
 #include "design/schedule/two_faces.h"
 #include "design/spline/made_surface.h"
+#include "design/transport/semi_discrete.h"
 #include "design/waves/wave_picture.h"
 
 namespace lensforge {
@@ -251,12 +257,89 @@ DesignOptions in_one_index(DesignOptions options) {
   return options;
 }
 
+/// σ to which a shared front is smoothed, as a share of the lens and of its thickness: finer detail
+/// would gather light before the exit face, which makes it with little slope. At the edges the
+/// front rises to them, so that all light enters within them, and that must not fold either.
+constexpr double kFrontDetail = 1.0 / 50.0;
+constexpr double kFrontDepth = 1.0 / 3.0;
+/// Longer side of the picture that it is taken from, and its samples.
+constexpr int kSharedPixels = 64;
+constexpr int kFrontSamples = 200;
+constexpr int kSharedIterations = 20;
+
+/// The options of a lens whose exit face turns light half as much: by a flat front, to a wall twice
+/// as far, from a point twice as far.
+DesignOptions with_half_turn(DesignOptions options, const Eigen::Vector2d& size) {
+  LightOptions& light = options.light;
+  light.both_faces = false;
+  if (const auto place = place_of_source(light, size)) {
+    const Eigen::Vector3d middle(0.5 * size.x(), 0.5 * size.y(), 0.0);
+    light.source_position = middle + 2.0 * (*place - middle);
+    light.source_distance = 0.0;
+  }
+  light.source_angle = light.source_size = 0.0;
+  light.spectrum = {};
+  light.model = LightModel::kRays;
+  options.focal_length += options.focal_length - options.thickness;
+  options.pixels = std::min(options.pixels, kSharedPixels);
+  options.iterations = kSharedIterations;
+  options.levels = 1;
+  options.model = SurfaceModel::kSpline;
+  options.made_by.reset();
+  options.outline.reset();
+  options.checkpoint.clear();
+  options.resume = false;
+  return options;
+}
+
+/// A front that turns light half as much as the lens has to: the mirror image of the exit face of
+/// with_half_turn(), smoothed. @throw Interrupted
+std::shared_ptr<const HeightSpline> shared_front(const Image& target, const DesignOptions& options,
+                                                 const Executor& executor,
+                                                 const RunControl& control) {
+  control.report({"design", 0.0, 1.0, "shaping the front"});
+  const Eigen::Vector2i pixels = working_size(target.columns(), target.rows(), options.pixels);
+  const Eigen::Vector2d size = optical_setup(options, pixels).lens_size;
+  const DesignOptions half = with_half_turn(options, size);
+  try {
+    validate(half, target);
+  } catch (const InputError& error) {
+    throw InputError("--faces two: the front has to turn light as a lens for a wall at " +
+                     number_text(half.focal_length) + " mm does; " + error.what());
+  }
+  const DesignResult shaped = design_lens(target, half, executor, {control.stop_token(), {}});
+  if (shaped.status != DesignResult::Status::kDone) throw Interrupted();
+  const SplineSurface exit(*shaped.lens.spline);
+  const double spacing = size.maxCoeff() / kFrontSamples;
+  SurfacePatch patch;
+  OpticalField(exit).sample(lens_grid(size, spacing), executor, patch);
+  Image heights(static_cast<int>(patch.window.columns), static_cast<int>(patch.window.rows));
+  for (int row = 0; row < heights.rows(); ++row) {
+    for (int column = 0; column < heights.columns(); ++column) {
+      const std::int64_t from_below = heights.rows() - 1 - row;
+      heights.at(column, row) = static_cast<float>(
+          -patch.z[static_cast<std::size_t>(from_below * heights.columns() + column)]);
+    }
+  }
+  // Two blurs, of half the variance each.
+  const double sigma = std::max(kFrontDetail * size.maxCoeff(), kFrontDepth * options.thickness);
+  for (int k = 0; k < 2; ++k) heights = soften(heights, 0.5 * sigma / spacing, 0.0);
+  HeightGrid grid{heights.columns(), heights.rows(), {}};
+  const float highest = *std::ranges::max_element(heights.values());
+  for (const float z : heights.values()) grid.heights.push_back(z - highest);
+  return std::make_shared<const HeightSpline>(std::move(grid));
+}
+
 }  // namespace
 
 DesignResult design_lens(const Image& target, const DesignOptions& options,
                          const Executor& executor, const RunControl& control) {
   validate(options, target);
-  const DesignOptions settled = with_smoothness_applied(in_one_index(options));
+  DesignOptions settled = with_smoothness_applied(in_one_index(options));
+  if (settled.light.both_faces) {
+    settled.light.front_heights = shared_front(target, settled, executor, control);
+    validate(settled, target);
+  }
   const DesignTask task = make_task(target, settled, executor, control);
   if (settled.second.picture) return design_two_faces(task, executor);
   Checkpoint state = first_state(task);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -133,6 +134,10 @@ void note_wedge(const DesignSettings& settings, const Console& console) {
                        "mm or lamps nearby, --source point, make them flatter"}));
 }
 
+double mean_of(const std::vector<float>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
 /// What the three lenses project together.
 struct ColorResult {
   LampPictures lamps;           ///< As projected.
@@ -140,11 +145,7 @@ struct ColorResult {
   std::vector<float> reached;   ///< Those of the sum.
   std::vector<float> distance;  ///< CIEDE2000, ascending.
 
-  [[nodiscard]] double mean() const {
-    double sum = 0.0;
-    for (const float d : distance) sum += d;
-    return sum / static_cast<double>(distance.size());
-  }
+  [[nodiscard]] double mean() const { return mean_of(distance); }
   [[nodiscard]] double below(double share) const {
     const double last = static_cast<double>(distance.size() - 1);
     return distance[static_cast<std::size_t>(share * last)];
@@ -172,23 +173,69 @@ std::array<double, 3> shares_of(const LampPictures& lamps, bool watts) {
   return shares;
 }
 
-/// How far pictures part, in pixels, from two common faults.
-struct Registration {
-  double wall = 0.0;  ///< Outer pictures, of a wall 1 % nearer.
-  double lamp = 0.0;  ///< One picture, of a lamp 1 mrad beside its place, seen from its lens.
+/// The mean difference of colours that one calls a good copy, CIEDE2000.
+constexpr double kGoodCopy = 2.0;
+
+/// A fault that takes the pictures apart along x, and what that does to the colours.
+struct Parting {
+  std::array<double, 3> moves{};  ///< Of red, green and blue in pixels, by one unit of the fault.
+  double difference = 0.0;        ///< Mean CIEDE2000 with one unit of it.
+  double good = 0.0;              ///< Units up to which that is kGoodCopy; 0 if it is more without.
+
+  /// Of the picture that moves most.
+  [[nodiscard]] double pixels() const { return *std::ranges::max_element(moves); }
 };
 
-Registration registration_of(const DesignSettings& settings, const Lens& lens) {
+/// A picture that is moved to the right by some pixels, and goes on as its border.
+Image moved(const Image& picture, double by) {
+  Image result(picture.columns(), picture.rows());
+  for (int row = 0; row < picture.rows(); ++row) {
+    for (int column = 0; column < picture.columns(); ++column) {
+      result.at(column, row) =
+          static_cast<float>(bilinear(picture, Eigen::Vector2d(column + 0.5 - by, row + 0.5)));
+    }
+  }
+  return result;
+}
+
+/// Measures a fault. A wall's scale and a lamp's blur are left out: they are small beside it.
+Parting parted(const ColorResult& result, const std::array<double, 3>& moves) {
+  const auto difference = [&](double units) {
+    LampPictures lamps = result.lamps;
+    for (std::size_t k = 0; k < 3; ++k) {
+      lamps.pictures[k] = moved(lamps.pictures[k], units * moves[k]);
+    }
+    return mean_of(color_differences(result.wanted, tristimulus(lamps)));
+  };
+  Parting parting{moves, difference(1.0), 0.0};
+  constexpr int kHalvings = 12;
+  double step = 10.0 / parting.pixels();
+  for (int i = 0; i < kHalvings; ++i, step /= 2.0) {
+    if (difference(parting.good + step) <= kGoodCopy) parting.good += step;
+  }
+  return parting;
+}
+
+/// The two faults of three lenses on one wall.
+struct Registration {
+  Parting wall;  ///< By 1 % nearer: the outer pictures.
+  Parting lamp;  ///< By 1 mrad beside its place, seen from its lens: that of the green one.
+};
+
+Registration registration_of(const DesignSettings& settings, const Lens& lens,
+                             const ColorResult& result) {
   const double pixel = lens.setup.image_size.x() / lens.setup.pixels.x();
   const double beyond = settings.design.focal_length - settings.design.thickness;
-  return {0.01 * pitch_of(settings) / pixel, 1e-3 * beyond / pixel};
+  const double by_wall = 0.01 * pitch_of(settings) / pixel;
+  return {parted(result, {-by_wall, 0.0, by_wall}),
+          parted(result, {0.0, 1e-3 * beyond / pixel, 0.0})};
 }
 
 nlohmann::json color_json(const DesignSettings& settings, const ColorTarget& target,
-                          const std::array<Lens, 3>& lenses, const ColorResult& result) {
+                          const std::array<Lens, 3>& lenses, const ColorResult& result,
+                          const Registration& fault) {
   const std::array<double, 3> watts = shares_of(target.split.lamps, true);
   const std::array<double, 3> lumens = shares_of(target.split.lamps, false);
-  const Registration shift = registration_of(settings, lenses[0]);
   nlohmann::json lamps = nlohmann::json::array();
   for (std::size_t k = 0; k < 3; ++k) {
     const double place = static_cast<double>(k) - 1.0;
@@ -199,17 +246,30 @@ nlohmann::json color_json(const DesignSettings& settings, const ColorTarget& tar
                      {"share_of_lumens", lumens[k]},
                      {"metrics", metrics_json(lenses[k])}});
   }
-  return {{"lamps", lamps},
-          {"delta_e",
-           {{"mean", result.mean()}, {"p95", result.below(0.95)}, {"max", result.below(1.0)}}},
-          {"outside", target.split.outside},
-          {"registration_pixels", {{"wall_1_percent", shift.wall}, {"lamp_1_mrad", shift.lamp}}}};
+  return {
+      {"lamps", lamps},
+      {"delta_e",
+       {{"mean", result.mean()}, {"p95", result.below(0.95)}, {"max", result.below(1.0)}}},
+      {"outside", target.split.outside},
+      {"registration_pixels",
+       {{"wall_1_percent", fault.wall.pixels()}, {"lamp_1_mrad", fault.lamp.pixels()}}},
+      {"registration_delta_e",
+       {{"wall_1_percent", fault.wall.difference}, {"lamp_1_mrad", fault.lamp.difference}}},
+      {"registration_good", {{"wall_percent", fault.wall.good}, {"lamp_mrad", fault.lamp.good}}}};
+}
+
+std::string parting_text(const std::string& what, const Parting& fault, const std::string& unit) {
+  const std::string words = joined({"  ", what, fixed(fault.pixels(), 1),
+                                    " pixels: mean difference ", fixed(fault.difference, 2)});
+  if (fault.good == 0.0) return words + "\n";
+  return words + joined({"; up to ", number_text(fault.good, 2), unit, " it stays below ",
+                         fixed(kGoodCopy, 0), "\n"});
 }
 
 std::string color_text(const DesignSettings& settings, const ColorTarget& target,
-                       const std::array<Lens, 3>& lenses, const ColorResult& result) {
+                       const std::array<Lens, 3>& lenses, const ColorResult& result,
+                       const Registration& fault) {
   const std::array<double, 3> watts = shares_of(target.split.lamps, true);
-  const Registration shift = registration_of(settings, lenses[0]);
   std::string text;
   for (std::size_t k = 0; k < 3; ++k) {
     text += joined({"  ", kLampNames[k], ", ", number_text(settings.color.lamps[k]), " nm, ",
@@ -222,9 +282,8 @@ std::string color_text(const DesignSettings& settings, const ColorTarget& target
     text += joined({"  ", fixed(100.0 * target.split.outside, 1),
                     " % of the pixels have colours that these lamps cannot mix\n"});
   }
-  return text + joined({"  a wall 1 % nearer moves the outer pictures by ", fixed(shift.wall, 1),
-                        " pixels, a lamp 1 mrad beside its place moves its picture by ",
-                        fixed(shift.lamp, 1), "\n"});
+  return text + parting_text("a wall 1 % nearer moves the outer pictures by ", fault.wall, " %") +
+         parting_text("a lamp 1 mrad beside its place moves its picture by ", fault.lamp, " mrad");
 }
 
 /// The command that mills the three lenses in their places.
@@ -245,7 +304,8 @@ CommandResult add_up(const DesignSettings& settings, const fs::path& out,
   std::array<Lens, 3> lenses;
   for (std::size_t k = 0; k < 3; ++k) lenses[k] = read_lens(out / kLampNames[k]);
   const ColorResult result = together(target, lenses);
-  nlohmann::json json = color_json(settings, target, lenses, result);
+  const Registration fault = registration_of(settings, lenses[0], result);
+  nlohmann::json json = color_json(settings, target, lenses, result, fault);
   const int columns = lenses[0].setup.pixels.x();
   const int rows = lenses[0].setup.pixels.y();
   const std::string record =
@@ -256,7 +316,7 @@ CommandResult add_up(const DesignSettings& settings, const fs::path& out,
   json["out"] = out.string();
   json["status"] = "done";
   return {json,
-          out.string() + ": three lenses\n" + color_text(settings, target, lenses, result),
+          out.string() + ": three lenses\n" + color_text(settings, target, lenses, result, fault),
           kDone,
           {},
           {"look at " + (out / kColorPicture).string() +

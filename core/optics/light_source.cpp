@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/optics/light_source.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -213,7 +213,9 @@ double source_blur(const OpticalSetup& setup, double z) {
   const double height = shape.is_disc() ? 1.0 : static_cast<double>(shape.rows) / shape.columns;
   const Eigen::Matrix2d sides =
       setup.extent.width * source_motion(setup, z) * Eigen::Vector2d(1.0, height).asDiagonal();
-  return Eigen::JacobiSVD<Eigen::Matrix2d>(sides).singularValues()[0];
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> squares;
+  squares.computeDirect(sides.transpose() * sides, Eigen::EigenvaluesOnly);
+  return std::sqrt(squares.eigenvalues()[1]);
 }
 
 }  // namespace lensforge

@@ -46,7 +46,8 @@ void append_light(const LightOptions& light, json& description) {
   }
   const SourceShape& shape = light.source_shape;
   if (!shape.is_disc()) description.push_back({shape.columns, shape.rows, shape.weights});
-  if (light.front_heights) {
+  // A shared front follows from the rest.
+  if (light.front_heights && !light.both_faces) {
     const HeightGrid& grid = light.front_heights->grid();
     description.push_back({grid.columns, grid.rows, grid.heights});
   }

@@ -322,6 +322,9 @@ void describe(Description& d, LightOptions& o) {
          "--source-size; without it the lamp is an evenly lit disc")
       .left_out = "the shape that it shows is stored";
   describe_front(d, o);
+  d.word("--faces", o.both_faces, {{"one", false}, {"two", true}},
+         "faces of a lens that are shaped: the exit face alone, or both, each with about half of "
+         "the slopes");
   d.flag("--fresnel", o.fresnel,
          "count the light that a lens's two faces reflect, without coating: what slopes steeply "
          "lets less through");

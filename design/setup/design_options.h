@@ -48,8 +48,10 @@ struct LightOptions {
   SourceKind source = SourceKind::kParallel;
   std::optional<double> front_radius;                 ///< Radius, mm; above 0: convex; none: flat.
   std::string front_file;                             ///< File of a front that is a height map.
-  std::shared_ptr<const HeightSpline> front_heights;  ///< Content of front_file.
-  std::optional<Eigen::Vector3d> source_position;     ///< Place of a point source, mm, lens frame.
+  std::shared_ptr<const HeightSpline> front_heights;  ///< Content of front_file, or shared.
+  /// Both faces are shaped: half of the turn that light takes is the front's (shared_front()).
+  bool both_faces = false;
+  std::optional<Eigen::Vector3d> source_position;  ///< Place of a point source, mm, lens frame.
   /// Distance of a point source from a lens's flat face, in front of its middle, mm; 0: stated by
   /// source_position.
   double source_distance = 0.0;

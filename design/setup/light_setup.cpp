@@ -339,15 +339,21 @@ void require_sphere(const DesignOptions& o, const Eigen::Vector2i& pixels, doubl
 }
 
 void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
-  const bool map = !o.light.front_file.empty();
-  if (!map && !o.light.front_radius) return;
-  const std::string given =
-      map ? "--front " + o.light.front_file : front_text(*o.light.front_radius);
-  if (!traits(o.light.body).transmits) {
-    refuse(given, std::string("is of a lens; --front flat works with --mode ") +
-                      traits(o.light.body).mode);
+  const bool file = !o.light.front_file.empty();
+  if (o.light.both_faces && (file || o.light.front_radius)) {
+    refuse("--faces two", "shapes the front itself; leave out --front");
   }
-  if (!map) return require_sphere(o, pixels, *o.light.front_radius);
+  const bool map = file || o.light.front_heights;
+  if (!map && !o.light.front_radius && !o.light.both_faces) return;
+  const std::string given = o.light.both_faces ? "--faces two"
+                            : file             ? "--front " + o.light.front_file
+                                               : front_text(*o.light.front_radius);
+  if (!traits(o.light.body).transmits) {
+    refuse(given,
+           std::string("is of a lens; leave it out with --mode ") + traits(o.light.body).mode);
+  }
+  if (o.light.front_radius) return require_sphere(o, pixels, *o.light.front_radius);
+  if (o.light.both_faces && !o.light.front_heights) return;
   LF_CHECK(o.light.front_heights != nullptr, given);
   const OpticalSetup setup = optical_setup(o, pixels);
   require_source_outside(o, setup);
@@ -743,9 +749,11 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   if (options.light.front_radius) {
     setup.front = spherical_front(*options.light.front_radius, setup.lens_size);
   }
-  if (options.light.front_heights) {
+  const auto take_heights = [&] {
+    if (!options.light.front_heights) return;
     setup.front = HeightFront{options.light.front_heights, setup.lens_size};
-  }
+  };
+  if (!options.light.both_faces) take_heights();
   if (options.light.source == SourceKind::kPoint) {
     setup.lamp = PointSource{place_of_source(options.light, setup.lens_size).value(),
                              options.light.emission};
@@ -758,6 +766,8 @@ OpticalSetup optical_setup(const DesignOptions& options, const Eigen::Vector2i& 
   setup.extent = source_extent(options.light);
   setup.image_origin =
       0.5 * (setup.lens_size - setup.image_size) + chief + options.light.image_offset;
+  // A shared front leaves the picture where a flat one has it.
+  if (options.light.both_faces) take_heights();
   tilt_screen(options.light.screen_tilt, setup);
   if (options.second.picture) setup.second = second_screen(options, setup);
   return setup;
@@ -793,6 +803,7 @@ void require_plain_lens(const DesignOptions& o) {
       {!traits(o.light.body).transmits, "--mode: a mirror has one face; leave out --second"},
       {o.light.front_radius || o.light.front_heights,
        "--front: --second shapes the front itself; leave out --front"},
+      {o.light.both_faces, "--faces: --second shapes both faces itself; leave out --faces"},
       {o.model != SurfaceModel::kSpline, "--model: --second needs --model spline"},
       {o.made_by.has_value(),
        "--made-by: a process is known of one face only; leave it out with --second"},

@@ -47,6 +47,14 @@ TEST_F(ThreeLamps, AddUpToAPictureInColour) {
   EXPECT_LT(result["delta_e"]["mean"].get<double>(), 1.0);
   EXPECT_LT(result["delta_e"]["max"].get<double>(), 6.0);
   EXPECT_EQ(result["outside"], 0.0);
+  for (const auto& [fault, good] :
+       {std::pair("wall_1_percent", "wall_percent"), std::pair("lamp_1_mrad", "lamp_mrad")}) {
+    const double difference = result["registration_delta_e"][fault];
+    EXPECT_GT(difference, result["delta_e"]["mean"].get<double>()) << fault;
+    const double up_to = result["registration_good"][good];
+    EXPECT_GT(up_to, 0.0) << good;
+    EXPECT_EQ(difference <= 2.0, up_to >= 1.0) << good;
+  }
   double watts = 0.0;
   std::vector<std::string> folders;
   for (const nlohmann::json& lamp : result["lamps"]) {

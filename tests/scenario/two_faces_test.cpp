@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/image/image_io.h"
+#include "core/io/lens_folder.h"
+#include "core/lens/lens.h"
 #include "scenario/driver.h"
 
 namespace lensforge::scenario {
@@ -75,6 +78,54 @@ TEST_F(TwoFaces, ProjectBothPicturesAsAnIndependentTraceFromTheFrontFinds) {
   ASSERT_EQ(between.exit_code, 0) << between.err;
   EXPECT_GT(between.json()["flux_inside"].get<double>(), 0.8);
   EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr("second wall   z = 120.00 mm"));
+}
+
+/// A design of one picture at short distance.
+Arguments one_picture(const std::string& faces, const std::string& out,
+                      const Arguments& more = {}) {
+  Arguments arguments{"design",   picture("portrait.png"),
+                      "--faces",  faces,
+                      "--pixels", "16",
+                      "--width",  "12mm",
+                      "--focal",  "15mm",
+                      "--quiet",  "--quality",
+                      "draft",    "--out",
+                      out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST_F(TwoFaces, ShareTheSlopesOfOnePicture) {
+  std::vector<double> relief;
+  for (const std::string faces : {"one", "two"}) {
+    const Outcome made = run(one_picture(faces, path(faces), {"--json"}));
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_LT(made.json()["metrics"]["spline"]["mae"].get<double>(), 0.006) << faces;
+    const SurfaceMesh exit = read_lens(at(faces)).surface;
+    relief.push_back(exit.vertices.row(2).maxCoeff() - exit.vertices.row(2).minCoeff());
+  }
+  EXPECT_LT(relief[1], 0.5 * relief[0]);
+  const Lens lens = read_lens(at("two"));
+  const auto& front = std::get<HeightFront>(lens.setup.front.value()).spline->grid().heights;
+  EXPECT_EQ(*std::max_element(front.begin(), front.end()), 0.0F);
+  EXPECT_NEAR(*std::min_element(front.begin(), front.end()), -relief[1], 0.5 * relief[1]);
+  for (const std::string how : {"spline", "forward"}) {
+    EXPECT_NEAR(tracer_finds(path("two"), how)["mae"].get<double>(),
+                lens.metrics.at(SurfaceModel::kSpline).mae, 1e-3)
+        << how;
+  }
+}
+
+TEST_F(TwoFaces, WhatBothForOnePictureCannotHaveIsRefusedInOneLine) {
+  const std::pair<Arguments, std::vector<std::string>> faults[] = {
+      {{"--front", "sphere:100"}, {"--faces two", "leave out --front"}},
+      {{"--mode", "reflect", "--incidence", "30"}, {"--faces two", "--mode reflect"}},
+      {{"--second", picture("rings.png"), "--second-focal", "60mm"}, {"--faces", "--second"}}};
+  for (const auto& [options, words] : faults) {
+    expect_refusal(run(one_picture("two", path("lens"), options)), 2, words);
+    EXPECT_FALSE(fs::exists(at("lens"))) << options.front();
+  }
+  expect_refusal(run(one_picture("three", path("lens"))), 2, {"--faces three", "one, two"});
 }
 
 TEST_F(TwoFaces, WhatTheyCannotHaveIsRefusedInOneLine) {
