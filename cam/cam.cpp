@@ -7,6 +7,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <variant>
 
 #include "cam/job/cut_job.h"
 #include "cam/job/job_files.h"
@@ -18,6 +19,7 @@
 #include "cam/tolerance/tolerance_forecast.h"
 #include "core/error.h"
 #include "core/io/files.h"
+#include "core/optics/front.h"
 #include "core/optics/picture_blur.h"
 #include "core/text/number_text.h"
 #include "design/waves/wave_picture.h"
@@ -85,8 +87,13 @@ constexpr double kSecondsPerPoint = 1e-5;       ///< Of a roughing or semi-finis
 constexpr double kMovesPerPoint = 0.1;          ///< Most of them lie on straight passes.
 constexpr double kSecondsPerSample = 2.5e-7;    ///< Of a surface, milled, polished and rendered.
 constexpr double kSecondsPerPartNode = 1.9e-7;  ///< Of a part with errors (docs/performance.md).
-constexpr double kMemoryPerPartNode = 24.0;     ///< Bytes: three heights while they are sampled.
-constexpr double kSurfaces = 8.0;               ///< Number rendered.
+/// Pictures behind a front, those of twice as many samples each way counted four times.
+constexpr double kFrontPictures = 16.0;
+constexpr double kSecondPictures = 2.0;       ///< Of them again, on a second screen.
+constexpr double kSecondsPerFrontRay = 2e-6;  ///< A lens of 6 mm, two screens: 4 s of 2.2e6 rays.
+constexpr double kMemoryPerFrontRay = 16.0;   ///< Bytes: its height maps, the finer ones alone.
+constexpr double kMemoryPerPartNode = 24.0;   ///< Bytes: three heights while they are sampled.
+constexpr double kSurfaces = 8.0;             ///< Number rendered.
 
 constexpr double kWaveSurfaces = 4.0;  ///< Number whose waves are computed.
 /// Of such a surface, beside wave_seconds(): it has finer nodes than a design's (portrait of 256²
@@ -163,7 +170,7 @@ double wavelength_of(const CamOptions& options, const OpticalSetup& setup) {
 bool may_take_waves(const CamOptions& options, const OpticalSetup& setup) {
   const bool creased =
       leaves_creases(options.surface.value_or(SurfaceModel::kSmooth), options.workshop.polish);
-  return options.render &&
+  return options.render && options.face == CutFace::kBack &&
          light_choice({setup, {}}, options.light, creased, middle_wavelength(setup)).waves;
 }
 
@@ -190,9 +197,23 @@ double part_nodes(const CamOptions& options, const OpticalSetup& setup) {
   return static_cast<double>(part_nodes(plan));
 }
 
+/// Rays of the pictures behind a front that is cut.
+double front_rays(const CamOptions& options, const OpticalSetup& setup) {
+  if (options.face == CutFace::kBack) return 0.0;
+  const double pictures = kFrontPictures + (setup.second ? kSecondPictures : 0.0);
+  return pictures * samples_of(options, setup) / kSurfaces;
+}
+
 /// Nodes of all pictures of parts with errors.
 double drawn_nodes(const CamOptions& options, const OpticalSetup& setup) {
   return static_cast<double>(part_draws(options, setup).pictures()) * part_nodes(options, setup);
+}
+
+/// Knot cells of the spline that is cut, about: a lens's has as many as its picture has pixels.
+double spline_cells(const CamOptions& options, const OpticalSetup& setup) {
+  if (options.face == CutFace::kBack) return setup.pixels.cast<double>().prod();
+  const HeightGrid& grid = std::get<HeightFront>(setup.front.value()).spline->grid();
+  return (grid.columns - 1.0) * (grid.rows - 1.0);
 }
 
 /// Comparisons are written so that NaN is refused too.
@@ -220,6 +241,7 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   estimate.seconds =
       (length * seconds_per_mm(options) + points * kSecondsPerPoint +
        samples_of(options, setup) * kSecondsPerSample + seconds_by_waves(options, setup) +
+       front_rays(options, setup) * kSecondsPerFrontRay +
        drawn_nodes(options, setup) * kSecondsPerPartNode) /
       threads;
   estimate.disk_bytes = (moves + kMovesPerPoint * points) * kBytesPerMove;
@@ -227,10 +249,11 @@ WorkEstimate estimate_cut(const CamOptions& options, const OpticalSetup& setup, 
   if (options.render) {
     estimate.memory_bytes += moves * memory_per_move(options.workshop.process.finish) +
                              nodes_of(size) * kMemoryPerNode +
-                             part_nodes(options, setup) * kMemoryPerPartNode;
+                             part_nodes(options, setup) * kMemoryPerPartNode +
+                             front_rays(options, setup) * kMemoryPerFrontRay;
     if (may_take_waves(options, setup)) estimate.memory_bytes += kMemoryOfWaves;
-    if (options.surface == SurfaceModel::kSpline) {
-      estimate.memory_bytes += setup.pixels.cast<double>().prod() * kMemoryPerSplinePixel;
+    if (options.surface == SurfaceModel::kSpline || options.face == CutFace::kFront) {
+      estimate.memory_bytes += spline_cells(options, setup) * kMemoryPerSplinePixel;
     }
     estimate.disk_bytes += nodes_of(size) * kDiskPerNode;
   }

@@ -68,7 +68,12 @@ void check_workshop(const std::string& file, const CamOptions& cam) {
 
 void settle(OptionSet& options, CamSettings& settings) {
   take_workshop(options, settings.workshop, settings.cam);
-  if (!settings.source.empty()) settings.cam.job = folder_name(settings.source);
+  if (!settings.source.empty()) {
+    settings.cam.job = folder_name(settings.source);
+    const bool front = settings.cam.face == CutFace::kFront;
+    settings.cam.other_cut =
+        fs::path(settings.source) / (front ? lens_file::kCut : lens_file::kFrontCut);
+  }
   check_workshop(settings.workshop, settings.cam);
 }
 
@@ -148,6 +153,18 @@ std::string wave_text(const ReportData& report) {
   return text;
 }
 
+/// The same on the second screen of a lens for two pictures, and which faces are as made.
+std::string two_face_text(const ReportData& report) {
+  std::string text;
+  if (report.second) {
+    for (RenderedSurface surface : {report.second->designed, report.second->part()}) {
+      surface.name += ", on the second screen";
+      text += surface_text(surface);
+    }
+  }
+  return report.face_words.empty() ? text : text + "  " + report.face_words + "\n";
+}
+
 std::string summary_text(const fs::path& folder, const CamResult& result) {
   const ReportData& report = result.report;
   std::string text = folder.string() + ": " + result.message + "\n";
@@ -156,13 +173,15 @@ std::string summary_text(const fs::path& folder, const CamResult& result) {
   if (!report.leakage.steps.empty()) {
     text += surface_text(report.leakage.designed);
     for (const RenderedSurface& surface : report.leakage.others) text += surface_text(surface);
-    text += wave_text(report);
+    text += wave_text(report) + two_face_text(report);
     if (report.places_matter()) {
       for (const LeakPlace& place : report.places) text += "  " + leak_words(place) + "\n";
     }
     if (!report.tolerances.empty()) text += "  " + report.range_words() + "\n";
+    if (!report.faces.empty()) text += "  " + face_error_words(report.faces) + "\n";
   }
-  return text + verdict_text(report.verdict) + z_text(report.z_offset);
+  text += verdict_text(report.verdict);
+  return report.front ? text : text + z_text(report.z_offset);
 }
 
 CommandResult cut(CommandFrame& frame, const CamSettings& settings, const Lens& lens) {

@@ -10,6 +10,7 @@
 #include "cam/cam.h"
 #include "cam/plan/cam_options.h"
 #include "cam/report/verdict.h"
+#include "core/io/lens_folder.h"
 
 namespace lensforge::app {
 
@@ -21,9 +22,10 @@ struct CamSettings {
   std::vector<std::string> compare;  ///< Items to compare; empty: make programs.
   CamOptions cam;
 
-  /// DIR/cam
+  /// DIR/cam, for a front DIR/cam-front.
   [[nodiscard]] std::filesystem::path folder() const {
-    return std::filesystem::path(source) / "cam";
+    const bool front = cam.face == CutFace::kFront;
+    return std::filesystem::path(source) / (front ? lens_file::kFrontCut : lens_file::kCut);
   }
 };
 

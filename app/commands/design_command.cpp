@@ -476,11 +476,13 @@ void write_design(const fs::path& folder, const DesignResult& result, const Cons
   std::error_code ignored;
   if (!result.colors) fs::remove(folder / lens_file::kRenderColor, ignored);
   if (!result.wall) fs::remove(folder / lens_file::kWall, ignored);
-  const fs::path cut = folder / lens_file::kCut;
-  if (!fs::is_directory(cut, ignored)) return;
-  remove_cut(cut);
-  if (!fs::remove(cut, ignored)) {
-    console.note(cut.string() + ": holds files that lensforge did not write; they are kept");
+  for (const char* const name : {lens_file::kCut, lens_file::kFrontCut}) {
+    const fs::path cut = folder / name;
+    if (!fs::is_directory(cut, ignored)) continue;
+    remove_cut(cut);
+    if (!fs::remove(cut, ignored)) {
+      console.note(cut.string() + ": holds files that lensforge did not write; they are kept");
+    }
   }
 }
 

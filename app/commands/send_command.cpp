@@ -231,12 +231,14 @@ bool holds(const fs::path& folder, const char* name) {
 std::string way_to_make(const fs::path& program, const std::string& dialect) {
   const std::string post = " --post " + dialect;
   const fs::path folder = program.has_parent_path() ? program.parent_path() : fs::path(".");
-  const bool named = folder.filename() == "cam";
+  const bool named =
+      folder.filename() == lens_file::kCut || folder.filename() == lens_file::kFrontCut;
   const fs::path above = named ? folder.parent_path() : folder / "..";
   const fs::path lens = above.empty() ? fs::path(".") : above;
   const std::string others = ", with the other options that made it";
   if (holds(folder, cam_file::kReport) && holds(lens, lens_file::kJson)) {
-    return "make it with lensforge cam " + shell_word(lens.string()) + post + others;
+    const char* const face = folder.filename() == lens_file::kFrontCut ? " --face front" : "";
+    return "make it with lensforge cam " + shell_word(lens.string()) + face + post + others;
   }
   if (holds(folder, coupon_file::kSheet)) {
     return "make it with lensforge coupon --out " + shell_word(folder.string()) + post + others;

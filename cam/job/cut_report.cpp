@@ -151,8 +151,17 @@ std::string mm(double value, int decimals) { return decimal_text(value, decimals
 
 /// Faces that lie down and that are cut. If no light passes the part, its underside needs no
 /// polish.
-std::string up_words(PartKind part, const Lens& lens) {
-  if (part == PartKind::kMould) return "the mould's cavity is cut from above";
+std::string up_words(const CutSetup& setup) {
+  const Lens& lens = *setup.lens;
+  if (setup.options.part == PartKind::kMould) return "the mould's cavity is cut from above";
+  if (setup.is_front()) {
+    return "the front, where light enters, is cut from above into the flat blank, which lies on "
+           "what becomes its back";
+  }
+  if (setup.frame) {
+    return "the front that was cut before down, on the frame around it; the optical surface is cut "
+           "from above";
+  }
   if (!traits(lens.setup.body).transmits) {
     return joined({"underside down, which needs no polish; the ", traits(lens.setup.body).name,
                    "'s surface is cut from above"});
@@ -222,7 +231,7 @@ bool takes_sheet(const WrittenCut& cut) {
                        material.find("Acryl") != std::string::npos ||
                        material.find("PMMA") != std::string::npos;
   return acrylic && !cut.shared && setup.options.part == PartKind::kLens &&
-         !setup.lens->setup.front;
+         (setup.is_front() || !setup.lens->setup.front);
 }
 
 /// How a sheet becomes as high as the blank.
@@ -238,10 +247,68 @@ std::string height_words(const CutSetup& setup, double sheet) {
   const double off = sheet - height;
   const std::string measure = "; measure it, sheets are up to 0.4 mm and a tenth off";
   if (off < 0.5 * std::pow(10.0, -kHeightDecimals)) return fit + measure;
+  // The second setup's programs count on the blank's height, --stock on both its faces.
+  if (setup.is_front()) {
+    return joined({fit, ": face it off by ", mm(off, kHeightDecimals), measure});
+  }
   return joined({fit, ": face its top off by ", mm(off, kHeightDecimals),
                  ", or run cam with --stock ",
                  trimmed_decimal(setup.options.workshop.stock.allowance + off, 3),
                  "mm, whose programs start from its top", measure});
+}
+
+/// A force of 1 N in the middle of a square plate that is clamped all around bends it by 0.0056 a²
+/// / D (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, table 37), D = E t³ / 12 (1
+/// − ν²).
+/// @param side, thickness  mm. @return µm; of acrylic.
+double sag_of(double side, double thickness) {
+  constexpr double kClamped = 0.0056;
+  constexpr double kModulus = 3200.0;  // N/mm²
+  constexpr double kPoisson = 0.37;
+  const double stiffness =
+      kModulus * thickness * thickness * thickness / (12.0 * (1.0 - kPoisson * kPoisson));
+  return 1e3 * kClamped * side * side / stiffness;
+}
+
+/// What carries the blank in the second setup, and how stiff that is.
+std::string support_words(const CutSetup& setup) {
+  const OpticalSetup& optics = setup.lens->setup;
+  const double frame = frame_width(setup.options, optics);
+  const double span =
+      optics.lens_size.maxCoeff() + 2.0 * (setup.options.workshop.stock.margin - frame);
+  const double least = setup.lens->surface.vertices.row(2).minCoeff();
+  return joined({"a flat frame at least ", mm(frame, 2), " wide, ",
+                 mm(0.0 - setup.frame.value(), 3), " below the front's height 0, which carries ",
+                 mm(span, 1), " of the lens, ", mm(least, 2), " thick or more: 1 N in its middle ",
+                 "bends it by up to ", decimal_text(sag_of(span, least), 3), " µm"});
+}
+
+/// How the two setups of a lens whose faces are both cut follow each other; empty for one setup.
+std::string two_setup_words(const CutSetup& setup) {
+  if (!setup.frame) return "";
+  const double margin = setup.options.workshop.stock.margin;
+  const std::string left = decimal_text(-margin, 3);
+  const std::string right = decimal_text(setup.lens->setup.lens_size.x() + margin, 3);
+  const double top = setup.is_front() ? setup.back_top : setup.blank.max().z();
+  const std::string high = mm(top - *setup.frame, 3);
+  if (!setup.is_front()) {
+    return joined({"second of two setups. The blank lies on ", support_words(setup),
+                   ". Z 0 is the table under the frame, so that the lens's thickness does not ",
+                   "depend on the blank's, which is ", high,
+                   " before the cut. Zero X and Y on the ",
+                   "edges of the first setup: that which was at the left there is at the right, X ",
+                   right, ", the lower one at Y ", left});
+  }
+  return joined(
+      {"first of two setups. The front comes first, because the flat blank lies on its "
+       "whole face, and its top, the frame that stays around the front, becomes what it "
+       "lies on. Zero X and Y on the blank's left edge, X ",
+       left, ", and its lower edge, Y ", left, ", and mark both. The blank is ", high,
+       " high. Then polish the front and turn the blank over about the axis along Y: "
+       "its left edge comes to the right, X ",
+       right, ", its lower edge stays at Y ", left, ". It lies on ", support_words(setup),
+       ". Cut the back with lensforge cam ", setup.options.job,
+       " --z-zero table and the other options as now, Z 0 on the table"});
 }
 
 /// What is touched off, and which Z it is.
@@ -271,7 +338,7 @@ SetupSheet setup_sheet(const WrittenCut& cut) {
   const char* const part = traits(designed.setup.body).name;
   sheet.zero_words = joined(
       {"lower left corner of the ", cut.shared ? "blank" : part, ", ", words_for(options.z_zero)});
-  sheet.up_words = up_words(options.part, designed);
+  sheet.up_words = up_words(setup);
   sheet.length_words = length_words_of(options.post, cut.programs);
   sheet.z_words = z_zero_words(setup);
   if (takes_sheet(cut)) {
@@ -279,7 +346,14 @@ SetupSheet setup_sheet(const WrittenCut& cut) {
     sheet.height_words = height_words(setup, sheet.sheet);
   }
   sheet.apron = setup.apron;
-  if (lens && designed.setup.front) {
+  sheet.other_words = two_setup_words(setup);
+  if (setup.is_front()) {
+    sheet.part.min().z() = options.workshop.stock.allowance;
+  } else if (setup.frame) {
+    sheet.front = designed.setup.front;
+    sheet.frame = setup.frame;
+    sheet.frame_width = frame_width(options, designed.setup);
+  } else if (lens && designed.setup.front) {
     sheet.front = designed.setup.front;
     sheet.front_words = front_words(setup);
     sheet.blank = whole_box(setup, *designed.setup.front);
@@ -575,11 +649,18 @@ std::string spindle_warning(const WrittenCut& cut) {
 std::string margin_warning(const CutSetup& setup) {
   const double margin = setup.options.workshop.stock.margin;
   const double needed = overhang(setup.lens->surface, setup.lens->setup);
-  if (setup.options.part != PartKind::kLens || !(needed > margin)) return {};
-  return "light enters the front up to " + mm(needed, 2) +
-         " beyond the lens's edges, but the blank ends at " + mm(margin, 2) +
-         ": the picture's rim stays dark unless stock.margin is at least " +
-         mm(std::ceil(10.0 * needed) / 10.0, 1);
+  if (setup.options.part != PartKind::kLens) return {};
+  const std::string lit = joined(
+      {"light enters the front up to ", mm(needed, 2), " beyond the lens's edges, but the "});
+  if (setup.frame) {
+    if (!(needed > setup.apron)) return {};
+    return joined(
+        {lit, "front is cut ", mm(setup.apron, 2), " beyond them: the picture's rim stays dark"});
+  }
+  if (!(needed > margin)) return {};
+  return joined({lit, "blank ends at ", mm(margin, 2),
+                 ": the picture's rim stays dark unless stock.margin is at least ",
+                 mm(std::ceil(10.0 * needed) / 10.0, 1)});
 }
 
 std::vector<std::string> warnings_of(const WrittenCut& cut) {
@@ -642,6 +723,21 @@ Verdict whole_verdict(const WrittenCut& cut, const std::optional<Prediction>& pr
   return verdict;
 }
 
+/// Which faces of a lens of two shaped ones the pictures show as made; empty for a back that is cut
+/// into a blank with its front.
+std::string face_words(const CutSetup& setup, const Prediction& prediction) {
+  const std::vector<RenderedSurface>& others = prediction.leakage.others;
+  const bool both = std::any_of(others.begin(), others.end(), [](const RenderedSurface& one) {
+    return one.name == surface_name::kBoth;
+  });
+  if (!both && !setup.frame) return "";
+  const char* const other = setup.is_front() ? "back" : "front";
+  const std::string words =
+      joined({"The pictures show this face as cut and polished and the ", other, " as designed"});
+  if (both) return joined({words, "; “", surface_name::kBoth, "” shows both as made."});
+  return joined({words, ": cut the ", other, ", too, and this again, for the picture of both."});
+}
+
 void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& data) {
   data.target = lens.target;
   data.leakage = prediction.leakage;
@@ -653,29 +749,20 @@ void add_prediction(const Prediction& prediction, const Lens& lens, ReportData& 
         ReportHaze{haze.share, haze.width(), haze.roughness.rms, haze.roughness.correlation};
   }
   data.haze_words = prediction.haze_words;
+  data.second = prediction.second;
   if (traits(data.body).transmits) data.ghost = ghost_share(lens.setup.ior);
   data.sampling = prediction.sampling;
   data.shown = {{surface_name::kDesigned, "what is meant"},
                 {surface_name::kRounded, "the most that the ball can reach"},
                 {surface_name::kMilled, "before polishing: its ridges scatter light"},
-                {surface_name::kPolished, "the finished part"}};
+                {surface_name::kPolished, "the finished part"},
+                {surface_name::kBoth, "both as cut and polished"}};
   data.places = prediction.places;
   data.tolerances = prediction.tolerances;
+  data.faces = prediction.faces;
   data.surface = prediction.surface;
   data.maps = {prediction.height, fillet_map(prediction.creases),
                fillet_share_map(prediction.creases)};
-}
-
-/// Fingerprint of the design from lens.json; empty if it has none.
-std::string fingerprint_of(const Lens& lens) {
-  const nlohmann::json& provenance = lens.provenance.json();
-  if (!provenance.is_object()) return "";
-  const auto stated = provenance.find("fingerprint");
-  if (stated == provenance.end() || !stated->is_string()) return "";
-  constexpr std::size_t kDigits = 16;
-  const auto& text = stated->get_ref<const std::string&>();
-  const bool hexadecimal = text.find_first_not_of("0123456789abcdef") == std::string::npos;
-  return text.size() == kDigits && hexadecimal ? text : "";
 }
 
 }  // namespace
@@ -690,6 +777,7 @@ ReportData make_report(const WrittenCut& cut, const std::optional<Prediction>& p
   data.lens_id = fingerprint_of(lens);
   data.body = lens.setup.body;
   data.part = options.part == PartKind::kMould ? "mould" : traits(data.body).name;
+  data.front = setup.is_front();
   data.lens_size = lens.setup.lens_size;
   data.leakage_options = options.leakage;
   data.operations = report_operations(cut);
@@ -711,6 +799,7 @@ ReportData make_report(const WrittenCut& cut, const std::optional<Prediction>& p
     data.polish = polish_task(setup);
     data.tolerance_hint = tolerance_hint(setup, cut.shared);
     add_prediction(*prediction, lens, data);
+    data.face_words = face_words(setup, *prediction);
   }
   data.verdict = whole_verdict(cut, prediction);
   return data;

@@ -393,6 +393,8 @@ SamplingCheck check_sampling(const LeakageChain& chain, const LeakageResult& res
   fine_setup.grid = with_half_the_spacing(setup.grid);
   const std::vector<CellRange> windows = windows_of(setup);
   const auto with_fine_windows = [&](const SurfaceField& field, FluxPicture picture) {
+    // A front is sampled as a whole, whatever it is rendered for.
+    if (setup.back != nullptr) return render_field(field, fine_setup, executor, silent);
     for (const CellRange& window : windows) {
       const FluxPicture coarse = render_cells(field, setup, window, executor, silent);
       const FluxPicture fine = render_cells(field, fine_setup, halved(window), executor, silent);
@@ -409,7 +411,7 @@ SamplingCheck check_sampling(const LeakageChain& chain, const LeakageResult& res
   const FluxPicture design_now = with_fine_windows(*chain.designed.field, design_before);
   double cells = 0.0;
   for (const CellRange& window : windows) cells += area_of(window);
-  const double scale = area_of(all_cells(setup.grid)) / cells;
+  const double scale = setup.back != nullptr ? 1.0 : area_of(all_cells(setup.grid)) / cells;
   return {setup.grid.spacing.minCoeff(),
           scale * (leakage_share(now, design_now) - leakage_share(before, design_before)),
           scale * (mae_of(now, target) - mae_of(before, target))};

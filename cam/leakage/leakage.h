@@ -237,8 +237,8 @@ struct SamplingCheck {
 };
 
 /// Renders kSamplingWindows² windows, evenly spaced over the lens, at half the spacing and
-/// extrapolates the change to the whole lens. Costs about a fifth of the two surfaces' pictures for
-/// 128² pixels and less for more.
+/// extrapolates the change to the whole lens; of fronts (FieldRenderSetup::back) all of it. Costs
+/// about a fifth of the two surfaces' pictures for 128² pixels and less for more.
 /// @param chain  behind `result`.
 /// @param target  with the setup's pixels.
 /// @throw Interrupted.

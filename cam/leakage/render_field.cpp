@@ -2,13 +2,20 @@
 #include "cam/leakage/render_field.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
 
 #include "core/error.h"
+#include "core/optics/front.h"
+#include "core/optics/light_path.h"
+#include "core/optics/light_source.h"
 #include "core/optics/optical_setup.h"
 #include "design/flux/flux_image.h"
 #include "design/waves/wave_picture.h"
@@ -161,10 +168,211 @@ void add_colors(SurfaceTile& tile, const FieldRenderSetup& setup,
   }
 }
 
+/// Surfaces as height maps, at the nodes of a grid over the lens.
+/// @param level  from which heights count, mm: 32 bits of a thick lens's would be coarse.
+std::vector<HeightFront> height_maps(std::span<const SurfaceField* const> fields, double level,
+                                     const FieldRenderSetup& setup, const Executor& executor,
+                                     const RunControl& control, const TileObserver& observe = {}) {
+  const GridWindow& grid = setup.grid;
+  const auto columns = static_cast<std::size_t>(grid.columns);
+  std::vector<HeightGrid> heights(
+      fields.size(), {static_cast<int>(grid.columns), static_cast<int>(grid.rows),
+                      std::vector<float>(columns * static_cast<std::size_t>(grid.rows))});
+  SurfacePatch patch;
+  for (const CellRange& tile : tiles_of(all_cells(grid), setup.tile)) {
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      if (control.stop_requested()) throw Interrupted();
+      const GridWindow window = window_of(grid, tile, 1);
+      fields[f]->sample(window, executor, patch);
+      patch.window = window;
+      if (observe) observe(*fields[f], tile, patch);
+      for (std::int64_t j = 0; j < window.rows; ++j) {
+        const auto from_top = static_cast<std::size_t>(grid.rows - 1 - window.first_row - j);
+        const auto* const row = patch.z.data() + j * window.columns;
+        std::transform(row, row + window.columns,
+                       heights[f].heights.begin() +
+                           static_cast<std::ptrdiff_t>(from_top * columns) + window.first_column,
+                       [level](double z) { return static_cast<float>(z - level); });
+      }
+    }
+  }
+  const Eigen::Vector2d size = grid.spacing.cwiseProduct(
+      Eigen::Vector2d(static_cast<double>(grid.columns - 1), static_cast<double>(grid.rows - 1)));
+  std::vector<HeightFront> fronts;
+  for (HeightGrid& one : heights) {
+    fronts.push_back({std::make_shared<const HeightSpline>(std::move(one)), size, grid.origin});
+  }
+  return fronts;
+}
+
+/// Rays followed from a height map to the optical surface behind it and to the screen.
+class FrontTrace {
+ public:
+  /// @param optics  with the front; must outlive this, as must `back`, its heights above `level`.
+  FrontTrace(const OpticalSetup& optics, const HeightFront& back, double level)
+      : light_(optics),
+        before_(LightSource(optics).before_front()),
+        front_(*optics.front),
+        back_(back),
+        level_(level),
+        edge_(optics.outline.value_or(rectangle(optics.lens_size))) {}
+
+  /// A ray: where it leaves the lens and where it lands; NaN where it does not.
+  struct Ray {
+    IncidentRay inside{};
+    Eigen::Vector3d exit = FrontRefraction::unknown();
+  };
+
+  [[nodiscard]] Ray from(const Eigen::Vector2d& entry, Eigen::Vector2d& landing) const {
+    const FrontRefraction ray(front_, before_, entry);
+    Ray found{ray.ray(Eigen::Matrix2d::Identity())};
+    landing.setConstant(std::numeric_limits<double>::quiet_NaN());
+    if (!ray.lit || !(ray.b.z() > 0.0)) return found;
+    double along = (level_ - ray.e.z()) / ray.b.z();
+    FrontPoint back{};
+    for (int step = 0; step < kSteps; ++step) {
+      found.exit = ray.e + along * ray.b;
+      back = back_.at(found.exit.head<2>());
+      const double above = back.z + level_ - found.exit.z();
+      if (std::abs(above) < kNear) break;
+      along -= above / (back.gradient.dot(ray.b.head<2>()) - ray.b.z());
+    }
+    landing = land_of(light_, found.exit.head<2>(), found.exit.z(), back.gradient, &found.inside);
+    return found;
+  }
+
+  /// Passes the parts of a triangle of light that leave within the lens's edge to `sink`.
+  template <class Sink>
+  void visit(const std::array<const Ray*, 3>& rays, ImageTriangle image, double whole,
+             const Sink& sink) const {
+    const Corners corners{rays[0]->exit, rays[1]->exit, rays[2]->exit};
+    image.flux =
+        light_.intake(corners, {&rays[0]->inside, &rays[1]->inside, &rays[2]->inside}) / whole;
+    PlanTriangle plan;
+    Eigen::AlignedBox2d box;
+    for (std::size_t k = 0; k < 3; ++k) box.extend(plan[k] = rays[k]->exit.head<2>());
+    if (!std::isfinite(image.flux + box.sizes().sum())) return;
+    const OutlineIndex::Side side = edge_.side_of(box);
+    if (side == OutlineIndex::Side::kInside) sink(image);
+    if (side != OutlineIndex::Side::kAcross) return;
+    const Eigen::Vector2d u = plan[1] - plan[0];
+    const Eigen::Vector2d v = plan[2] - plan[0];
+    if (u.x() * v.y() < u.y() * v.x()) {  // Folded.
+      std::swap(plan[1], plan[2]);
+      std::swap(image.p1, image.p2);
+    }
+    for (const TrianglePiece& piece : edge_.inside(plan)) sink(image_of(image, piece));
+  }
+
+ private:
+  static constexpr int kSteps = 20;       ///< Newton's; smooth faces need three or four.
+  static constexpr double kNear = 1e-10;  ///< mm
+
+  static Outline rectangle(const Eigen::Vector2d& size) {
+    return {OutlineKind::kPolygon, 0.0, {{0.0, 0.0}, {size.x(), 0.0}, size, {0.0, size.y()}}};
+  }
+
+  LightPath light_;
+  FrontLight before_;
+  FrontSurface front_;
+  FrontSurface back_;
+  double level_;
+  OutlineIndex edge_;
+};
+
+/// Cells of a side of the tiles that are traced at once: 12 MB.
+constexpr std::int64_t kTracedTile = 256;
+
+/// Adds the light that enters one tile of a grid of entries.
+/// @param whole  of which fluxes are shares, mm².
+void add_traced(const FrontTrace& trace, const GridWindow& entries, const CellRange& tile,
+                double whole, const Executor& executor, FluxImage& image) {
+  const GridWindow window = window_of(entries, tile, 1);
+  const auto count = static_cast<std::size_t>(window.size());
+  std::vector<FrontTrace::Ray> rays(count);
+  std::vector<Eigen::Vector2d> landing(count);
+  parallel_for(executor, "trace from front", window.size(), [&](std::int64_t i) {
+    const auto k = static_cast<std::size_t>(i);
+    rays[k] = trace.from(window.node(i % window.columns, i / window.columns), landing[k]);
+  });
+  const auto sharp = [&](std::int64_t node) {
+    const std::int64_t column = node % window.columns;
+    const std::int64_t row = node / window.columns;
+    return sharp_landing(
+        landing, static_cast<std::size_t>(node), window.columns,
+        {column > 0 && column + 1 < window.columns, row > 0 && row + 1 < window.rows});
+  };
+  const std::int64_t first =
+      (tile.row - window.first_row) * window.columns + tile.column - window.first_column;
+  image.add(executor, tile.columns * tile.rows, [&](std::int64_t cell, const FluxAccumulator& sum) {
+    const std::int64_t a = first + cell / tile.columns * window.columns + cell % tile.columns;
+    const std::int64_t d = a + window.columns;
+    for (const std::array<std::int64_t, 3>& t :
+         {std::array{a, a + 1, d + 1}, std::array{a, d + 1, d}}) {
+      const auto ray = [&](std::size_t k) { return &rays[static_cast<std::size_t>(t[k])]; };
+      trace.visit({ray(0), ray(1), ray(2)}, {sharp(t[0]), sharp(t[1]), sharp(t[2]), 0.0}, whole,
+                  [&](const ImageTriangle& piece) {
+                    if (piece.p0.allFinite() && piece.p1.allFinite() && piece.p2.allFinite()) {
+                      deposit(piece, sum);
+                    }
+                  });
+    }
+  });
+}
+
+/// The lens's grid and as many cells around it as its light enters beyond it.
+GridWindow entries_of(const FieldRenderSetup& setup) {
+  GridWindow entries = setup.grid;
+  const Eigen::Vector2d cells = (setup.beyond / setup.grid.spacing.array()).ceil();
+  entries.origin -= cells.cwiseProduct(entries.spacing);
+  entries.columns += 2 * static_cast<std::int64_t>(cells.x());
+  entries.rows += 2 * static_cast<std::int64_t>(cells.y());
+  return entries;
+}
+
+/// The pictures of setup.back behind each of the surfaces.
+std::vector<FluxPicture> render_behind(std::span<const SurfaceField* const> fields,
+                                       const FieldRenderSetup& setup, const Executor& executor,
+                                       const RunControl& control, const TileObserver& observe) {
+  const Eigen::Vector2i& pixels = setup.optics.pixels;
+  const SourceKernel kernel = setup.blur();
+  SourceBlurOn<Executor> blur(kernel, pixels.x(), pixels.y(), executor);
+  const double level = setup.surface_height;
+  const HeightFront back = height_maps({&setup.back, 1}, level, setup, executor, control).front();
+  const GridWindow entries = entries_of(setup);
+  OpticalSetup optics = setup.optics_in_parts(kernel);
+  std::vector<FluxPicture> pictures;
+  for (const HeightFront& front : height_maps(fields, 0.0, setup, executor, control, observe)) {
+    optics.front = front;
+    FluxImage image(optics.pixels.x(), optics.pixels.y());
+    image.begin(executor);
+    const std::vector<LightColor> colors = light_colors(optics);
+    for (std::size_t color = 0; color < colors.size(); ++color) {
+      const FrontTrace trace(colors[color].setup, back, level);
+      const double all = setup.whole_in(color);
+      const double whole = all > 0.0 ? all : area_of(setup.grid, optics.outline);
+      for (const CellRange& tile : tiles_of(all_cells(entries), kTracedTile)) {
+        if (control.stop_requested()) throw Interrupted();
+        add_traced(trace, entries, tile, whole / colors[color].share, executor, image);
+      }
+    }
+    const std::span<const double> flux = blur.apply(executor, image.resolve(executor));
+    pictures.push_back({pixels.x(), pixels.y(), {flux.begin(), flux.end()}});
+    control.report({"render fronts", static_cast<double>(pictures.size()),
+                    static_cast<double>(fields.size()), "fronts"});
+  }
+  return pictures;
+}
+
 std::vector<FluxPicture> render_parts(std::span<const SurfaceField* const> fields,
                                       const FieldRenderSetup& setup, const CellRange& cells,
                                       const Executor& executor, const RunControl& control,
                                       const TileObserver& observe = {}) {
+  if (setup.back != nullptr) {
+    LF_CHECK(cells.columns * cells.rows == (setup.grid.columns - 1) * (setup.grid.rows - 1),
+             "a part of a front");
+    return render_behind(fields, setup, executor, control, observe);
+  }
   const Eigen::Vector2i pixels = setup.optics.pixels;
   const SourceKernel kernel = setup.blur();
   const OpticalSetup optics = setup.optics_in_parts(kernel);

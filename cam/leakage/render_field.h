@@ -270,6 +270,11 @@ struct FieldRenderSetup {
   std::vector<double> whole{};
   /// Approximate height of the surface, mm, for the image of an extended source.
   double surface_height = 0.0;
+  /// If set, the surfaces that are rendered are entry faces, in place of that of `optics`, and this
+  /// is the optical surface. Rays are then followed from the front: behind its ridges light may
+  /// fold inside the lens. For render_fields() and what calls it, of whole lenses.
+  const SurfaceField* back = nullptr;
+  double beyond = 0.0;  ///< Distance beyond the lens's edges at which its light enters, mm.
 
   [[nodiscard]] double whole_in(std::size_t color) const {
     return whole.empty() ? 0.0 : whole[color];

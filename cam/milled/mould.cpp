@@ -4,9 +4,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <utility>
+#include <variant>
 
 #include "core/error.h"
+#include "core/lens/continued_surface.h"
 #include "core/lens/lens.h"
+#include "core/spline/control_net.h"
 #include "core/text/number_text.h"
 
 namespace lensforge {
@@ -75,6 +79,18 @@ Lens mould_lens(const Lens& lens, const MouldOptions& options) {
         turned_over(lens.spline->points, lens.spline->shape, far_corner(lens.surface), options);
   }
   return mould;
+}
+
+Lens front_lens(const Lens& lens, double top) {
+  const auto& front = std::get<HeightFront>(lens.setup.front.value());
+  ControlNet net = net_of(front);
+  net.points = turned_over(net.points, net.shape, {front.size.x(), top}, {0.0, 0.0});
+  Lens turned = lens;
+  turned.setup.front.reset();
+  turned.model = SurfaceModel::kSpline;
+  turned.surface = spline_nodes(net, kMeshSamples).mesh;
+  turned.spline = std::move(net);
+  return turned;
 }
 
 namespace {

@@ -31,18 +31,24 @@ SurfaceMesh mould_surface(const SurfaceMesh& lens, const MouldOptions& options);
 /// @throw InputError as mould_surface() does.
 Lens mould_lens(const Lens& lens, const MouldOptions& options);
 
-/// Frame of a lens in the mould that it is cast in, from mould_surface().
+/// A lens whose optical surface is the front of another one that has a height map for it: that lens
+/// turned over about its y axis, with its plane z = `top` in z = 0 and no front of its own.
+/// @return all else as the lens has it. @pre lens.setup.front is a HeightFront.
+Lens front_lens(const Lens& lens, double top);
+
+/// Frame of a lens that lies turned over about its y axis: in the mould that it is cast in, from
+/// mould_surface(), or for the cut of its front, from front_lens().
 struct CastFrame {
-  double scale = 1.0;      ///< 1 / (1 − shrinkage)
+  double scale = 1.0;      ///< 1 / (1 − shrinkage); of a front 1.
   double width = 0.0;      ///< Of the lens along x, mm.
-  double top = 0.0;        ///< Highest point of the lens's surface, mm.
-  double thickness = 0.0;  ///< Minimum thickness of the mould, mm.
+  double top = 0.0;        ///< Highest point of the lens's surface, or front_lens()'s `top`, mm.
+  double thickness = 0.0;  ///< Minimum thickness of the mould, mm; of a front 0.
 };
 
-/// The surface of the lens that is cast in a mould, in the lens's frame.
+/// The surface that lies in such a frame, in the lens's own: that of a cast lens, or its front.
 class CastField final : public SurfaceField {
  public:
-  /// @param mould  must outlive the field.
+  /// @param mould  what lies in the frame; must outlive the field.
   CastField(const SurfaceField& mould, const CastFrame& frame) : mould_(mould), frame_(frame) {}
 
   void sample(const GridWindow& window, const Executor& executor,

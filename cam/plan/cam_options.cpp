@@ -9,14 +9,18 @@
 #include <variant>
 
 #include "cam/milled/mould.h"
+#include "cam/path/finish_raster.h"
+#include "cam/path/rough.h"
 #include "cam/plan/finishing.h"
 #include "cam/post/program_writer.h"
 #include "core/error.h"
 #include "core/image/color.h"
 #include "core/lens/optical_surface.h"
+#include "core/optics/front.h"
 #include "core/optics/polish_transfer.h"
 #include "core/schema/description.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 namespace {
@@ -111,9 +115,116 @@ void validate_margin(const CamOptions& options) {
           decimal_text(std::ceil(100.0 * needed) / 100.0, 2) + " mm works");
 }
 
-/// A lens with a curved front lies in a nest during the cut, and its blank already has the front.
+const HeightFront* height_map_of(const OpticalSetup& setup) {
+  return setup.front ? std::get_if<HeightFront>(&*setup.front) : nullptr;
+}
+
+/// Width that the frame of a front has to have, mm.
+double frame_needed(const Process& process, const Workshop& workshop) {
+  double widest = kMinFrame;
+  if (process.rough.enabled) widest = std::max(widest, workshop.tool(process.rough.tool).radius());
+  if (process.semi.enabled) widest = std::max(widest, workshop.tool(process.semi.tool).radius());
+  return widest;
+}
+
+/// What stock.margin lacks for a frame, and one that works; empty if there is a frame.
+std::string frame_fault(const CamOptions& options, const OpticalSetup& setup) {
+  const double width = frame_width(options, setup);
+  const double needed = frame_needed(options.workshop.process, options.workshop);
+  if (width >= needed) return "";
+  const double margin = options.workshop.stock.margin;
+  return joined({"stock.margin ", shortest_text(margin), " mm leaves no flat frame ",
+                 shortest_text(needed), " mm wide around the front for the blank to lie on"});
+}
+
+/// A margin that leaves a frame.
+std::string margin_for_frame(const CamOptions& options, const OpticalSetup& setup) {
+  const double more =
+      frame_needed(options.workshop.process, options.workshop) - frame_width(options, setup);
+  const double margin = options.workshop.stock.margin + more;
+  return joined({"--margin ", decimal_text(std::ceil(10.0 * margin) / 10.0, 1), "mm"});
+}
+
+/// The greatest slope of a height map at its samples and half-way between them, and its place.
+std::pair<double, Eigen::Vector2d> steepest_of(const HeightFront& front) {
+  const FrontSurface surface(front);
+  const HeightGrid& grid = front.spline->grid();
+  const Eigen::Vector2d half =
+      0.5 * front.size.cwiseQuotient(Eigen::Vector2d(grid.columns - 1, grid.rows - 1));
+  std::pair<double, Eigen::Vector2d> steepest{0.0, {0.0, 0.0}};
+  for (int j = 0; j < 2 * grid.rows - 1; ++j) {
+    for (int i = 0; i < 2 * grid.columns - 1; ++i) {
+      const Eigen::Vector2d at = front.corner + half.cwiseProduct(Eigen::Vector2d(i, j));
+      const double slope = surface.at(at).gradient.norm();
+      if (slope > steepest.first) steepest = {slope, at};
+    }
+  }
+  return steepest;
+}
+
+/// The options of a front's cut; the blank has to stay whole for its back.
+void validate_face(const CamOptions& options, const OpticalSetup& setup) {
+  if (options.face == CutFace::kBack) return;
+  const HeightFront* const front = height_map_of(setup);
+  if (options.part != PartKind::kLens) {
+    throw InputError("--face front: a mould is cut from one side; leave it out");
+  }
+  if (front == nullptr) {
+    throw InputError(joined({"--face front: the lens's front is ",
+                             setup.front ? "a sphere, which its blank is bought or ground with"
+                                         : "flat, as the blank's",
+                             "; only a front of --second or --front FILE is cut"}));
+  }
+  if (options.surface && *options.surface != SurfaceModel::kSpline) {
+    throw InputError(joined({"--surface ", model_name(*options.surface),
+                             ": a front is cut as the spline that it is; leave it out"}));
+  }
+  if (options.z_zero == ZZero::kTable) {
+    throw InputError(
+        "--z-zero table: the front's heights count from the top of the blank, which it lies on "
+        "afterwards; use stock or lens");
+  }
+  if (options.cut_outline == OutlineWish::kAlways) {
+    throw InputError(
+        "--cut-outline always: the blank has to stay whole until its back is cut; leave it out");
+  }
+  if (options.light == LightModel::kWaves) {
+    throw InputError("--light-model waves: a front is judged by rays; use auto or rays");
+  }
+  const auto [slope, place] = steepest_of(*front);
+  if (slope > kSteepestSlope) {
+    throw InputError(joined({"--face front: the front rises by ", decimal_text(slope, 2),
+                             " mm a millimetre at x ", decimal_text(place.x(), 2), " y ",
+                             decimal_text(place.y(), 2), ", too steep for the ball: at most ",
+                             shortest_text(kSteepestSlope),
+                             "; a design with a thicker lens has a gentler front"}));
+  }
+  const std::string fault = frame_fault(options, setup);
+  if (!fault.empty()) {
+    throw InputError(fault + " while its back is cut; " + margin_for_frame(options, setup) +
+                     " works");
+  }
+}
+
+/// A lens that lies on the frame of its front's cut.
+void validate_frame(const CamOptions& options, const OpticalSetup& setup) {
+  const std::string fault = frame_fault(options, setup);
+  if (!fault.empty()) {
+    throw InputError(joined({"--z-zero table: the lens's front is curved, and ", fault,
+                             "; use stock or lens, or ", margin_for_frame(options, setup)}));
+  }
+  if (cuts_outline(options, setup)) {
+    throw InputError(
+        "--z-zero table: the tabs of an outline need material at the blank's underside, which the "
+        "front's cut has taken; use --cut-outline never, and saw the lens out");
+  }
+}
+
+/// A lens with a curved front lies in a nest during the cut, and its blank already has the front;
+/// or it lies on the frame that the front's cut left.
 void validate_front(const CamOptions& options, const OpticalSetup& setup) {
-  if (!setup.front || options.part != PartKind::kLens) return;
+  if (!setup.front || options.part != PartKind::kLens || options.face == CutFace::kFront) return;
+  if (lies_on_frame(options, setup)) return validate_frame(options, setup);
   if (options.z_zero == ZZero::kTable) {
     throw InputError(
         "--z-zero table: the lens's front is curved and has no plane to lie on; use stock or lens");
@@ -221,6 +332,26 @@ Eigen::Vector2d scallop_spacings(const CamOptions& options, const OpticalSetup& 
   return spacings;
 }
 
+double frame_width(const CamOptions& options, const OpticalSetup& setup) {
+  const Workshop& workshop = options.workshop;
+  const double apron = apron_to_cut(options);
+  const Eigen::Vector2d around = Eigen::Vector2d::Constant(apron);
+  const Eigen::AlignedBox2d cut(-around, Eigen::Vector2d(setup.lens_size + around));
+  // The front's height 0 is the lowest place of its cut, and of the lens the nearest to the back.
+  const double relief = 0.0 - lowest_of(*height_map_of(setup), cut);
+  const Eigen::AlignedBox3d box(Eigen::Vector3d(cut.min().x(), cut.min().y(), 0.0),
+                                Eigen::Vector3d(cut.max().x(), cut.max().y(), relief));
+  // The finishing ball turns a radius beyond the apron.
+  const double reach = std::max(rough_reach(workshop, box, relief + workshop.stock.allowance),
+                                finishing_ball(options).diameter);
+  return workshop.stock.margin - apron - reach;
+}
+
+bool lies_on_frame(const CamOptions& options, const OpticalSetup& setup) {
+  return options.face == CutFace::kBack && options.part == PartKind::kLens &&
+         options.z_zero == ZZero::kTable && height_map_of(setup) != nullptr;
+}
+
 std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup) {
   if (larger_ball(options) != nullptr) {
     return "draws parts of one finishing ball only: set finish.large_tool = 0";
@@ -261,6 +392,7 @@ void validate(const CamOptions& options, const OpticalSetup& setup) {
   validate_tolerances(options, setup);
   validate_wavelength(options, setup);
   validate_margin(options);
+  validate_face(options, setup);
   validate_front(options, setup);
   validate_outline(options);
 }
@@ -272,7 +404,7 @@ std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup) {
 }
 
 bool cuts_outline(const CamOptions& options, const OpticalSetup& setup) {
-  if (options.part == PartKind::kMould) return false;
+  if (options.part == PartKind::kMould || options.face == CutFace::kFront) return false;
   if (options.cut_outline == OutlineWish::kIfShaped) return setup.outline.has_value();
   return options.cut_outline == OutlineWish::kAlways;
 }
@@ -389,9 +521,14 @@ void describe_blank(Description& d, CamOptions& o, const Description& shop) {
          "height of rapid moves above the top of the blank");
   d.word("--z-zero", o.z_zero,
          {{"stock", ZZero::kStock}, {"table", ZZero::kTable}, {"lens", ZZero::kLens}},
-         "Z0: top of the blank, the table below it, or the lens's highest point");
+         "Z0: top of the blank, the table below it, or the lens's highest point; under a shaped "
+         "front the table is below the frame that --face front leaves");
   d.word("--part", o.part, {{"lens", PartKind::kLens}, {"mould", PartKind::kMould}},
          "mill the lens, or the mould to cast it in");
+  d.word("--face", o.face, {{"back", CutFace::kBack}, {"front", CutFace::kFront}},
+         "the face to cut: back, where light leaves the lens, or a front that is a height map, "
+         "first, into a flat blank that is turned over afterwards")
+      .essential = true;
   d.number("--shrinkage", o.shrinkage, Limits::between(0, kMaxShrinkage), "",
            "shrinkage of the cast part, share of a length");
   d.word("--surface", o.surface, surfaces(),

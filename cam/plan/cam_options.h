@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <set>
 #include <string>
@@ -25,8 +26,18 @@ struct Passes;
 /// Position of program Z = 0.
 enum class ZZero {
   kStock,  ///< Top of the blank.
-  kTable,  ///< Underside of the blank: z = 0 of the lens frame. For flat fronts only.
-  kLens,   ///< Highest point of the finished surface.
+  /// What the blank lies on: z = 0 of the lens frame, or below a front that is a height map the
+  /// frame that its cut leaves (lies_on_frame()).
+  kTable,
+  kLens,  ///< Highest point of the finished surface.
+};
+
+/// The face of a lens that is cut.
+enum class CutFace {
+  kBack,  ///< The optical surface, where light leaves the lens.
+  /// A height map where light enters. It is cut first, into a flat blank, turned over about the
+  /// lens's y axis (front_lens()).
+  kFront,
 };
 
 /// The part that is made.
@@ -58,6 +69,9 @@ struct CamOptions {
   std::string job = "lens";  ///< Name of the part.
 
   PartKind part = PartKind::kLens;
+  CutFace face = CutFace::kBack;
+  /// Folder of the cut of the other face, whose part is predicted with this one; none if empty.
+  std::filesystem::path other_cut;
   double shrinkage = 0.0;  ///< Of casts from a mould, share of a length, 0 … 0.2.
   /// Surface to cut: the mesh's facets, the smooth surface over the mesh (SmoothSurface), or the
   /// lens's own spline; none: the model that the lens was designed with.
@@ -119,6 +133,17 @@ std::vector<Eigen::Vector2d> edge_of(const OpticalSetup& setup);
 
 /// True if the outline is cut.
 bool cuts_outline(const CamOptions& options, const OpticalSetup& setup);
+
+/// Minimum width of the frame that a front's cut leaves, mm: as wide as a tab, which holds a part;
+/// and of a tool's radius, less than which roughing takes off.
+inline constexpr double kMinFrame = 3.0;
+
+/// Width of the blank's rim that the cut of a front leaves flat on every side, mm; below 0 where
+/// the tools go beyond the blank. @pre the front is a height map.
+double frame_width(const CamOptions& options, const OpticalSetup& setup);
+
+/// True if the blank lies on such a frame while its back is cut.
+bool lies_on_frame(const CamOptions& options, const OpticalSetup& setup);
 
 /// Why CamOptions::tolerances cannot draw parts of such a lens, or so cut; empty if it can.
 std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup);

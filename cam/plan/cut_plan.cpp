@@ -24,13 +24,33 @@ constexpr double kSketchSpacing = 0.5;
 /// Unit of a program's last decimal where nothing is rounded, mm.
 constexpr double kUnrounded = 1e-9;
 
-std::shared_ptr<const Lens> mould_to_cut(const Lens& lens, const CamOptions& options) {
+/// Height of the blank's top while the back of a lens is cut, mm, lens frame.
+double top_of_back(const Lens& lens, CamOptions options) {
+  options.face = CutFace::kBack;
+  options.z_zero = ZZero::kStock;
+  return cut_setup(lens, options).blank.max().z();
+}
+
+std::shared_ptr<const Lens> lens_to_turn(const Lens& lens, const CamOptions& options,
+                                         double back_top) {
+  if (options.face == CutFace::kFront) {
+    return std::make_shared<const Lens>(front_lens(lens, back_top));
+  }
   if (options.part == PartKind::kLens) return nullptr;
   return std::make_shared<const Lens>(mould_lens(lens, {options.shrinkage}));
 }
 
+/// Height of the frame that the front's cut leaves, mm, lens frame: below the front. The blank of
+/// both cuts has one thickness.
+double frame_height(const Lens& lens, CamOptions options) {
+  options.face = CutFace::kFront;
+  options.z_zero = ZZero::kStock;
+  return cut_setup(lens, options).frame.value();
+}
+
 /// @throw InputError if the lens is no spline and one is to be cut.
 SurfaceModel model_to_cut(const Lens& lens, const CamOptions& options) {
+  if (options.face == CutFace::kFront) return SurfaceModel::kSpline;
   const SurfaceModel model = options.surface.value_or(lens.model);
   if (model != SurfaceModel::kSpline || lens.spline) return model;
   throw InputError("--surface spline: must be facet or smooth, since this lens was designed as " +
@@ -58,16 +78,16 @@ GcodeMotion moved(GcodeMotion motion, const Eigen::Vector2d& by) {
   return motion;
 }
 
-double z_offset_of(ZZero zero, double surface_top, double blank_top) {
+double z_offset_of(ZZero zero, double surface_top, const Eigen::AlignedBox3d& blank) {
   switch (zero) {
     case ZZero::kStock:
-      return -blank_top;
+      return -blank.max().z();
     case ZZero::kLens:
       return -surface_top;
     case ZZero::kTable:
       break;
   }
-  return 0.0;
+  return 0.0 - blank.min().z();
 }
 
 }  // namespace
@@ -76,7 +96,8 @@ CutSetup cut_setup(const Lens& lens, const CamOptions& options) {
   CutSetup setup;
   setup.lens = &lens;
   setup.options = options;
-  setup.mould_lens = mould_to_cut(lens, options);
+  if (setup.is_front()) setup.back_top = top_of_back(lens, options);
+  setup.turned_lens = lens_to_turn(lens, options, setup.back_top);
   setup.model = model_to_cut(lens, options);
   if (options.light == LightModel::kWaves && setup.is_creased()) {
     throw InputError(joined({"--light-model waves: the part has creases, ",
@@ -84,15 +105,20 @@ CutSetup cut_setup(const Lens& lens, const CamOptions& options) {
                              ", which a wave does not show as rays do; use auto or rays"}));
   }
   setup.apron = apron_to_cut(options);
-  const Lens& part = setup.mould_lens ? *setup.mould_lens : lens;
+  const Lens& part = setup.turned_lens ? *setup.turned_lens : lens;
   setup.field = inspect_height_field(part.surface, size_to_cut(options, lens.setup));
-  const double scale = setup.mould() ? setup.mould()->scale : 1.0;
+  const double scale = setup.turned() ? setup.turned()->scale : 1.0;
   setup.optical =
       continued_surface(optical_surface(part, setup.model), setup.apron, {scale * RunOut{}.length});
   setup.box = with_heights(setup.field.box, setup.mesh());
   require_above_table(setup.box);
   setup.blank = options.workshop.stock.box(setup.box);
-  setup.z_offset = z_offset_of(options.z_zero, setup.field.box.max().z(), setup.blank.max().z());
+  if (setup.is_front()) setup.frame = setup.back_top - setup.blank.max().z();
+  if (lies_on_frame(options, lens.setup)) {
+    setup.frame = frame_height(lens, options);
+    setup.blank.min().z() = *setup.frame;
+  }
+  setup.z_offset = z_offset_of(options.z_zero, setup.field.box.max().z(), setup.blank);
   return setup;
 }
 
@@ -106,11 +132,12 @@ Eigen::AlignedBox2d CutSetup::cut_rectangle() const {
 }
 
 double CutSetup::apron_on_lens() const {
-  const std::optional<CastFrame> frame = mould();
-  return frame ? apron / frame->scale : apron;
+  const std::optional<CastFrame> cast = turned();
+  return cast ? apron / cast->scale : apron;
 }
 
-std::optional<CastFrame> CutSetup::mould() const {
+std::optional<CastFrame> CutSetup::turned() const {
+  if (is_front()) return CastFrame{1.0, lens->setup.lens_size.x(), back_top, 0.0};
   if (options.part == PartKind::kLens) return std::nullopt;
   const auto& vertices = lens->surface.vertices;
   return CastFrame{1.0 / (1.0 - options.shrinkage), vertices.row(0).maxCoeff(),
@@ -242,6 +269,23 @@ struct Operations {
   }
 };
 
+/// What the operator of a lens of two cut faces has to know of this one.
+std::vector<std::string> face_comments(const CutSetup& setup) {
+  if (!setup.frame) return {};
+  const double margin = setup.options.workshop.stock.margin;
+  const std::string left = decimal_text(-margin, 3);
+  const std::string right = decimal_text(setup.lens->setup.lens_size.x() + margin, 3);
+  if (setup.is_front()) {
+    return {"setup 1 of 2: the front, cut into the flat blank",
+            joined({"edges of the blank: left X ", left, ", lower Y ", left}),
+            joined({"then turn it over about the axis along Y: left edge to X ", right}),
+            "the back is cut with cam --face back --z-zero table"};
+  }
+  return {"setup 2 of 2: the back; the blank lies on the frame around its front",
+          joined({"blank turned over: the left edge of setup 1 is right, X ", right}),
+          joined({"lower edge of the blank: Y ", left})};
+}
+
 }  // namespace
 
 ProgramPlan plan_programs(const CutSetup& setup, const CutPasses& passes, CutRecord& record,
@@ -257,6 +301,7 @@ ProgramPlan plan_programs(const CutSetup& setup, const CutPasses& passes, CutRec
   plan.comments = {"units: mm; X0 Y0: lower left corner of the lens",
                    std::string("Z0: ") + words_for(options.z_zero),
                    "top of the blank: Z " + decimal_text(top, decimals_of(options))};
+  for (const std::string& words : face_comments(setup)) plan.comments.push_back(words);
   if (process.rough.enabled) plan.operations.push_back(all.rough());
   if (process.semi.enabled) plan.operations.push_back(all.semi());
   for (const FinishPass& pass : passes.finish) plan.operations.push_back(all.finish(pass));

@@ -34,22 +34,28 @@ inline bool leaves_creases(SurfaceModel model, const PolishModel& polish) {
 struct CutSetup {
   const Lens* lens = nullptr;
   CamOptions options;
-  std::shared_ptr<const Lens> mould_lens;      ///< Null if the lens itself is cut.
+  /// The mould's, or the lens turned over for its front; null if the lens is cut as it lies.
+  std::shared_ptr<const Lens> turned_lens;
   SurfaceModel model = SurfaceModel::kSmooth;  ///< Under which the surface is cut.
   HeightField field;                           ///< Size and steepness of the surface to cut.
   Eigen::AlignedBox3d box;  ///< The surface's from above, its heights with those of its apron.
+  /// Its underside is z = 0; where it lies on the frame of its front, that lies below.
   Eigen::AlignedBox3d blank;
   double z_offset = 0.0;  ///< Program Z − lens-frame z, mm.
   double apron = 0.0;     ///< Width of the surface's continuation, mm.
-  /// The surface to cut, the lens's or the mould's, and its continuation around it; mm, in a lens
-  /// frame of its own.
+  double back_top = 0.0;  ///< Of a front: z of the blank's other side, mm, the lens's frame.
+  /// z of the frame that the front's cut leaves, mm, lens frame; for its front and on that frame.
+  std::optional<double> frame;
+  /// The surface to cut, the lens's, the mould's or the front, and its continuation around it; mm,
+  /// in a lens frame of its own.
   std::shared_ptr<const OpticalSurface> optical;
 
   [[nodiscard]] bool is_creased() const { return leaves_creases(model, options.workshop.polish); }
   /// Mesh of the surface to cut.
   [[nodiscard]] const SurfaceMesh& mesh() const { return optical->mesh(); }
-  /// Frame of the lens in the mould, if there is one.
-  [[nodiscard]] std::optional<CastFrame> mould() const;
+  /// Frame of the lens in what is cut, if it lies turned over: in its mould, or for its front.
+  [[nodiscard]] std::optional<CastFrame> turned() const;
+  [[nodiscard]] bool is_front() const { return options.face == CutFace::kFront; }
   /// Rectangle of the surface to cut without its apron, seen from above.
   [[nodiscard]] Eigen::AlignedBox2d rectangle() const {
     return {field.box.min().head<2>(), field.box.max().head<2>()};

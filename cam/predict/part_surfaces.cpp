@@ -6,12 +6,22 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
+#include <string>
+#include <system_error>
 #include <utility>
+#include <variant>
 
+#include "cam/cam.h"
 #include "cam/contact/drop_cutter.h"
 #include "cam/milled/rounded_field.h"
+#include "core/error.h"
+#include "core/io/lens_folder.h"
 #include "core/lens/continued_surface.h"
 #include "core/lens/surface_field.h"
 
@@ -94,8 +104,8 @@ PartSurfaces::PartSurfaces(const Design& design, FinishPaths paths, const Polish
 }
 
 const SurfaceField* PartSurfaces::on_lens(const SurfaceField& cut) {
-  if (!design_.mould) return &cut;
-  cast_.push_back(std::make_unique<CastField>(cut, *design_.mould));
+  if (!design_.turned) return &cut;
+  cast_.push_back(std::make_unique<CastField>(cut, *design_.turned));
   return cast_.back().get();
 }
 
@@ -109,15 +119,19 @@ CutSurfaces::CutSurfaces(const CutSetup& setup, const CutPasses& passes, FinishP
     : cut_(meant_surface(setup.optical)),
       rounded_(cut_->rounded(passes.balls->surface(), setup.cut_rectangle(), executor)) {
   const Lens& lens = *setup.lens;
-  // The mould's surface differs from the surface of the lens cast in it.
-  if (setup.mould()) {
+  const std::optional<CastFrame> turned = setup.turned();
+  if (setup.is_front()) {
+    front_ = std::make_unique<CastField>(cut_->field(), *turned);
+  } else if (turned) {
+    // The mould's surface differs from the surface of the lens cast in it.
     lens_ = meant_surface(
         continued_surface(optical_surface(lens, setup.model), setup.apron_on_lens(), RunOut{}));
   }
-  const SurfaceField& meant = lens_ ? lens_->field() : cut_->field();
+  const SurfaceField& on_lens = lens_ ? lens_->field() : cut_->field();
+  const SurfaceField& meant = front_ ? *front_ : on_lens;
   const Eigen::AlignedBox2d rectangle(Eigen::Vector2d(0.0, 0.0), lens.setup.lens_size);
   surfaces_.emplace(
-      PartSurfaces::Design{meant, *rounded_, rectangle, setup.blank.max().z(), setup.mould()},
+      PartSurfaces::Design{meant, *rounded_, rectangle, setup.blank.max().z(), turned},
       std::move(paths), setup.options.workshop.polish);
 }
 
@@ -155,8 +169,6 @@ namespace {
 /// Rounding allowed in quotients, so that whole ones do not cost a cell.
 constexpr double kRounding = 1e-9;
 
-std::string layer_of(const std::string& surface) { return surface + ".z"; }
-
 /// Keeps the nodes of one tile.
 void keep_nodes(const SurfacePatch& patch, const PartGrid& grid, const std::string& name,
                 const Executor& executor, LayeredImage& layers) {
@@ -185,6 +197,68 @@ std::vector<std::string> layer_names(const std::vector<NamedSurface>& surfaces) 
 }
 
 }  // namespace
+
+std::string layer_of(const std::string& surface) { return surface + ".z"; }
+
+std::string fingerprint_of(const Lens& lens) {
+  const nlohmann::json& provenance = lens.provenance.json();
+  if (!provenance.is_object()) return "";
+  const auto stated = provenance.find("fingerprint");
+  if (stated == provenance.end() || !stated->is_string()) return "";
+  constexpr std::size_t kDigits = 16;
+  const auto& text = stated->get_ref<const std::string&>();
+  const bool hexadecimal = text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return text.size() == kDigits && hexadecimal ? text : "";
+}
+
+namespace {
+
+/// True if the report of a cut says that it is of this design and of this face.
+bool is_cut_of(const std::filesystem::path& folder, const std::string& lens_id, bool front) {
+  std::ifstream file(folder / cam_file::kReport);
+  const nlohmann::json report = nlohmann::json::parse(file, nullptr, false);
+  if (!report.is_object() || lens_id.empty()) return false;
+  return report.value("lens_id", "") == lens_id &&
+         report.value("face", "back") == (front ? "front" : "back") &&
+         report.value("part", "") == "lens";
+}
+
+}  // namespace
+
+std::optional<HeightFront> made_face(const CutSetup& cut) {
+  const Lens& lens = *cut.lens;
+  const std::filesystem::path& folder = cut.options.other_cut;
+  const bool shaped = lens.setup.front && std::holds_alternative<HeightFront>(*lens.setup.front);
+  if (folder.empty() || !shaped || !is_cut_of(folder, fingerprint_of(lens), !cut.is_front())) {
+    return std::nullopt;
+  }
+  std::error_code none;
+  const std::filesystem::path path = folder / lens_file::kPartSurfaces;
+  if (!std::filesystem::is_regular_file(path, none)) return std::nullopt;
+  const LayeredImage layers = read_layers(path);
+  const std::string name = layer_of(part_layer::kPart);
+  const bool fits =
+      layers.has(name) && std::min(layers.columns(), layers.rows()) >= kMinHeightSamples;
+  if (!fits) throw InputError(path.string() + ": has no heights of a part; remove it");
+  const std::span<const float> heights = layers.layer(name);
+  HeightGrid grid{layers.columns(), layers.rows(), {heights.begin(), heights.end()}};
+  return HeightFront{std::make_shared<const HeightSpline>(std::move(grid)), lens.setup.lens_size};
+}
+
+void HeightMapField::sample(const GridWindow& window, const Executor& executor,
+                            SurfacePatch& patch) const {
+  resize_patch(window, false, patch);
+  const auto sample_row = [&](std::int64_t j) {
+    for (std::int64_t i = 0; i < window.columns; ++i) {
+      const FrontPoint point = surface_.at(window.node(i, j));
+      const auto k = static_cast<std::size_t>(j * window.columns + i);
+      patch.z[k] = point.z;
+      patch.slope_x[k] = point.gradient.x();
+      patch.slope_y[k] = point.gradient.y();
+    }
+  };
+  parallel_for(executor, "sample height map", window.rows, sample_row, 16);
+}
 
 PartGrid part_grid(const Eigen::Vector2d& lens_size, const Eigen::Vector2d& spacings, double most) {
   const double coarse = std::max(kPartSpacing, std::sqrt(lens_size.prod() / most));

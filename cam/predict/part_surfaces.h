@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cam/contact/cut_surface.h"
@@ -20,6 +21,7 @@
 #include "core/image/rasters.h"
 #include "core/lens/optical_surface.h"
 #include "core/lens/surface_field.h"
+#include "core/optics/front.h"
 
 namespace lensforge {
 
@@ -48,11 +50,11 @@ class PartSurfaces {
  public:
   /// The designed surfaces and their frame. All must outlive the surfaces.
   struct Design {
-    const SurfaceField& surface;     ///< Of the lens; held, if tiles are to be shared.
-    const RoundedField& rounded;     ///< Of the surface to cut, lens or mould.
-    Eigen::AlignedBox2d rectangle;   ///< Of the lens, mm.
-    double blank_top = 0.0;          ///< mm
-    std::optional<CastFrame> mould;  ///< If the lens is cast.
+    const SurfaceField& surface;      ///< Of the lens; held, if tiles are to be shared.
+    const RoundedField& rounded;      ///< Of the surface to cut, lens or mould.
+    Eigen::AlignedBox2d rectangle;    ///< Of the lens, mm.
+    double blank_top = 0.0;           ///< mm
+    std::optional<CastFrame> turned;  ///< If the lens is cast, or lies turned over.
   };
 
   PartSurfaces(const Design& design, FinishPaths paths, const PolishModel& polish);
@@ -64,6 +66,8 @@ class PartSurfaces {
   [[nodiscard]] const SurfaceField& designed() const { return design_.surface; }
   [[nodiscard]] const SurfaceField& rounded() const { return *raw_[1]; }
   [[nodiscard]] const SurfaceField& milled() const { return *raw_.back(); }
+  /// As milled, in the frame of the cut.
+  [[nodiscard]] const SurfaceField& cut() const { return stretched_ ? *stretched_ : written_; }
   [[nodiscard]] const SurfaceField& part() const { return *polished_.back(); }
 
  private:
@@ -97,7 +101,8 @@ class CutSurfaces {
 
  private:
   std::unique_ptr<MeantSurface> cut_;
-  std::unique_ptr<MeantSurface> lens_;  ///< Null if it is the surface that is cut.
+  std::unique_ptr<MeantSurface> lens_;  ///< Null if it is the surface that is cut, or a front.
+  std::unique_ptr<CastField> front_;    ///< In the lens's frame, if that is cut.
   std::unique_ptr<RoundedField> rounded_;
   std::optional<PartSurfaces> surfaces_;
 };
@@ -108,6 +113,7 @@ inline constexpr const char* kDesigned = "designed";
 inline constexpr const char* kRounded = "tool-rounded";
 inline constexpr const char* kMilled = "as milled";
 inline constexpr const char* kPolished = "polished";
+inline constexpr const char* kBoth = "both faces";  ///< The part, and the other face as made.
 }  // namespace surface_name
 
 /// Surfaces in part.exr.
@@ -115,6 +121,29 @@ namespace part_layer {
 inline constexpr const char* kPolished = "polished";  ///< As designed, but polished.
 inline constexpr const char* kPart = "part";          ///< Cut and polished.
 }  // namespace part_layer
+
+/// Name of the layer with a surface's heights.
+std::string layer_of(const std::string& surface);
+
+/// Fingerprint of the design from lens.json; empty if it has none.
+std::string fingerprint_of(const Lens& lens);
+
+/// The other face of a lens with a shaped front as its own cut predicted it, from
+/// CamOptions::other_cut; nothing if there is no such cut of this design.
+std::optional<HeightFront> made_face(const CutSetup& cut);
+
+/// A face by its heights.
+class HeightMapField final : public SurfaceField {
+ public:
+  explicit HeightMapField(HeightFront map) : map_(std::move(map)), surface_(map_) {}
+
+  void sample(const GridWindow& window, const Executor& executor,
+              SurfacePatch& patch) const override;
+
+ private:
+  HeightFront map_;
+  FrontSurface surface_;
+};
 
 /// Approximate maximum number of nodes of a surface in part.exr: more would not fit a page of 15
 /// MB.

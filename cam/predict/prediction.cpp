@@ -7,6 +7,7 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -107,6 +108,35 @@ ReportMap height_map(const LeakMap& map) {
   return heights;
 }
 
+/// Largest differences of a front that is cut from the designed one, from the nodes of the part's
+/// layers; it lies turned over, so that material is left where it is lower.
+LeakMap front_map(const LayeredImage& layers, const SurfaceField& designed,
+                  const Eigen::Vector2d& lens_size, const Executor& executor) {
+  GridWindow nodes;
+  nodes.columns = layers.columns();
+  nodes.rows = layers.rows();
+  nodes.spacing = lens_size.cwiseQuotient(Eigen::Vector2d(layers.columns() - 1, layers.rows() - 1));
+  SurfacePatch patch;
+  designed.sample(nodes, executor, patch);
+  LeakMap map;
+  map.columns = std::max<std::int64_t>(1, std::llround(lens_size.x() / kLeakCell));
+  map.rows = std::max<std::int64_t>(1, std::llround(lens_size.y() / kLeakCell));
+  map.height.resize(static_cast<std::size_t>(map.columns * map.rows));
+  const std::span<const float> part = layers.layer(layer_of(part_layer::kPart));
+  for (std::int64_t j = 0; j < nodes.rows; ++j) {
+    for (std::int64_t i = 0; i < nodes.columns; ++i) {
+      const std::int64_t column = std::min(map.columns - 1, i * map.columns / nodes.columns);
+      const std::int64_t row = std::min(map.rows - 1, j * map.rows / nodes.rows);
+      const auto from_top = static_cast<std::size_t>((nodes.rows - 1 - j) * nodes.columns + i);
+      const double left = patch.z[static_cast<std::size_t>(j * nodes.columns + i)] -
+                          static_cast<double>(part[from_top]);
+      HeightDifference& most = map.height[static_cast<std::size_t>(row * map.columns + column)];
+      if (std::abs(left) > std::abs(most.value)) most = {left, nodes.node(i, j)};
+    }
+  }
+  return map;
+}
+
 /// Where the part leaks what the judged picture has too much. Places and remedies are those of the
 /// surface. Haze is no place's: with it the map's total would be less than the leakage, and pixels
 /// that it alone lights would count light of good places.
@@ -142,6 +172,110 @@ std::vector<PictureBlur> part_blurs(const OpticalSetup& setup, const CamOptions&
   return blurs;
 }
 
+namespace {
+
+/// The designed back behind a front that is cut; null if the back itself is cut.
+std::unique_ptr<MeantSurface> back_behind(const CutSetup& cut) {
+  if (!cut.is_front()) return nullptr;
+  return meant_surface(optical_surface(*cut.lens, cut.lens->model));
+}
+
+FieldRenderSetup render_setup(const Lens& lens, const GridWindow& grid, const Executor& executor) {
+  FieldRenderSetup setup{lens.setup, grid};
+  setup.surface_height = lens.surface.vertices.row(2).mean();
+  for (const LightColor& color : light_colors(lens.setup)) {
+    const LightPath light(color.setup);
+    if (!light.intake_is_plan_area()) setup.whole.push_back(lit_intake(lens, light, executor));
+  }
+  return setup;
+}
+
+/// A part's chain and its light.
+struct ChainLight {
+  const CutSetup& cut;
+  const LeakageChain& chain;
+  FieldRenderSetup setup;
+  const Executor& executor;
+  const RunControl& control;
+};
+
+/// A screen's picture to come, and what is judged by it.
+struct PartGoal {
+  const Image& target;
+  const FluxPicture& designed;
+  const Haze& haze;
+};
+
+/// The part with its other face as that was made, too. Rays are followed from the front.
+RenderedSurface with_made(ChainLight light, const HeightFront& made, const PartGoal& goal) {
+  const Lens& lens = *light.cut.lens;
+  const HeightMapField other(made);
+  const SurfaceField& own = *light.chain.part().field;
+  light.setup.back = light.cut.is_front() ? &other : &own;
+  light.setup.beyond = overhang(lens.surface, lens.setup);
+  const SurfaceField& front = light.cut.is_front() ? own : other;
+  RenderedSurface both{
+      surface_name::kBoth, render_field(front, light.setup, light.executor, light.control), {}};
+  FluxPicture& picture = both.picture;
+  if (!goal.haze.none()) {
+    picture.flux = hazed(goal.haze, picture.flux, {picture.columns, picture.rows}, light.executor);
+  }
+  both.quality = PictureJudge(goal.target, goal.designed, light.cut.options.leakage).judge(picture);
+  return both;
+}
+
+/// The part on the second screen, by rays; and with its other face as made, if that is known.
+LeakageResult on_second(ChainLight light, const std::optional<HeightFront>& made) {
+  const Image& target = light.cut.lens->second->target;
+  light.setup.optics = on_second_screen(light.setup.optics);
+  LeakageChain two;
+  two.designed = {light.chain.designed.name, light.chain.designed.field};
+  two.steps = {{surface_name::kPolished, light.chain.part().field}};
+  LeakageResult result = measure_leakage(two, target, light.setup, light.cut.options.leakage,
+                                         light.executor, light.control);
+  if (made) {
+    result.others.push_back(with_made(light, *made, {target, result.designed.picture, Haze()}));
+  }
+  return result;
+}
+
+/// What only a lens of two shaped faces has: its other face as made, and a second picture.
+void add_two_faces(const ChainLight& light, Prediction& result) {
+  const Lens& lens = *light.cut.lens;
+  const std::optional<HeightFront> made = made_face(light.cut);
+  if (made) {
+    const PartGoal goal{lens.target, result.leakage.designed.picture, result.haze};
+    result.leakage.others.push_back(with_made(light, *made, goal));
+  }
+  if (lens.second) result.second = on_second(light, made);
+}
+
+/// The milled surface, for the view and as a mesh.
+void add_shape(const PartSurfaces& surfaces, const CutSetup& cut, const Executor& executor,
+               Prediction& result) {
+  const Lens& lens = *cut.lens;
+  const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
+  // The view shows a front as it lies on the machine, with the tools' paths.
+  const SurfaceField& shown = cut.is_front() ? surfaces.cut() : surfaces.milled();
+  result.surface = raster_of(coarse_patch(shown, lens, spacing, executor));
+  result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
+}
+
+/// Where the light of a back is lost, and how a face differs from the designed one.
+void add_places(const PartSurfaces& surfaces, const LeakageChain& places_chain,
+                const ChainLight& light, Prediction& result) {
+  if (light.cut.is_front()) {
+    result.height = height_map(front_map(result.surfaces, surfaces.designed(),
+                                         light.cut.lens->setup.lens_size, light.executor));
+    return;
+  }
+  const LeakMap map = leak_map(light.chain, result, light.setup, light.executor);
+  result.places = worst_places(map, places_chain, result.judged(), light.setup, {}, light.executor);
+  result.height = height_map(map);
+}
+
+}  // namespace
+
 Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const Executor& executor,
                         const RunControl& control) {
   const Lens& lens = *cut.lens;
@@ -154,11 +288,11 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
   PartLayers layers(
       {{part_layer::kPolished, chain.steps.front().field}, {part_layer::kPart, &surfaces.part()}},
       lens.setup.lens_size, spacings);
-  FieldRenderSetup setup{lens.setup, grid};
-  setup.surface_height = lens.surface.vertices.row(2).mean();
-  for (const LightColor& color : light_colors(lens.setup)) {
-    const LightPath light(color.setup);
-    if (!light.intake_is_plan_area()) setup.whole.push_back(lit_intake(lens, light, executor));
+  const std::unique_ptr<MeantSurface> back = back_behind(cut);
+  FieldRenderSetup setup = render_setup(lens, grid, executor);
+  if (back) {
+    setup.back = &back->field();
+    setup.beyond = overhang(lens.surface, lens.setup);
   }
   for (NamedSurface& other : chain.others) {
     if (other.name != surface_name::kMilled) continue;
@@ -178,7 +312,9 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
   chain.haze = &result.haze;
   result.haze_words = haze_words(result.haze, haze({kExampleRoughness, roughness.correlation}));
   result.leakage = measure_leakage(chain, lens.target, setup, options.leakage, executor, control);
-  const LightChoice light = light_choice(setup, options.light, cut.is_creased(), wavelength);
+  const LightChoice light =
+      cut.is_front() ? LightChoice{false, "by rays: waves are computed of the back's cut alone"}
+                     : light_choice(setup, options.light, cut.is_creased(), wavelength);
   result.light_words = light.words;
   result.blurs = part_blurs(lens.setup, options, passes, setup.surface_height, wavelength);
   LeakageChain places_chain = chain;
@@ -192,14 +328,12 @@ Prediction predict_part(const PartSurfaces& surfaces, const CutSetup& cut, const
     places_chain = by_waves;
   }
   result.sampling = check_sampling(chain, result.leakage, lens.target, setup, executor, control);
-  const LeakMap map = leak_map(chain, result, setup, executor);
-  result.places = worst_places(map, places_chain, result.judged(), setup, {}, executor);
-  result.creases = creases.map();
-  result.height = height_map(map);
-  const double spacing = lens.setup.lens_size.maxCoeff() / kViewNodes;
-  result.surface = raster_of(coarse_patch(surfaces.milled(), lens, spacing, executor));
-  result.milled = mesh_of(coarse_patch(surfaces.milled(), lens, kMeshSpacing, executor));
   result.surfaces = layers.layers();
+  const ChainLight chain_light{cut, chain, setup, executor, control};
+  add_places(surfaces, places_chain, chain_light, result);
+  result.creases = creases.map();
+  add_two_faces(chain_light, result);
+  add_shape(surfaces, cut, executor, result);
   return result;
 }
 
@@ -394,7 +528,7 @@ LeakTrial TrialCut::at(const LeakPlace& place, const RunControl& control) const 
       sampled_grid(optics.lens_size, sample_spacings(before, optics, site_.setup.passes()));
   const Passes passes = passes_on_lens(options_, site_.setup.ground());
   const CellGrid fine = refined(grid, place.cells, sample_spacings(options_, optics, passes));
-  const std::optional<CastFrame> mould = site_.setup.mould();
+  const std::optional<CastFrame> mould = site_.setup.turned();
   const PolishModel& polish = options_.workshop.polish;
   const double polished =
       polish_reach(polish) * polish.sigma + (1.0 + kCreaseHalo) * grid.spacing.maxCoeff();
@@ -627,12 +761,25 @@ PartDraws part_draws(const CamOptions& options, const OpticalSetup& setup) {
   return {drawn ? kRangeParts : 0, 0};
 }
 
+namespace {
+
+/// What errors of the front against the back do to the designed pictures.
+std::vector<FaceError> errors_between_faces(const CutSetup& cut, const Executor& executor,
+                                            const RunControl& control) {
+  const Lens& lens = *cut.lens;
+  const auto back = meant_surface(optical_surface(lens, lens.model));
+  return face_errors(lens, back->field(), render_setup(lens, {}, executor),
+                     cut.options.workshop.tolerances, executor, control);
+}
+
+}  // namespace
+
 Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const CutSurfaces& cut,
                        const Executor& executor, const RunControl& control) {
   const CamOptions& options = setup.options;
   const PartSurfaces& surfaces = cut.surfaces();
   Prediction prediction = predict_part(surfaces, setup, executor, control);
-  if (options.remedies) {
+  if (options.remedies && !setup.is_front()) {
     try_remedies({setup, passes, surfaces.part(), prediction.judged(), prediction.light},
                  prediction.places, executor, control);
   }
@@ -640,6 +787,8 @@ Prediction predict_cut(const CutSetup& setup, const CutPasses& passes, const Cut
   if (draws.parts > 0) {
     prediction.tolerances = draw_parts(setup, draws, surfaces, prediction, executor, control);
   }
+  if (setup.frame && options.range)
+    prediction.faces = errors_between_faces(setup, executor, control);
   return prediction;
 }
 

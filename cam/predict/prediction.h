@@ -32,19 +32,22 @@ namespace lensforge {
 struct Prediction {
   LeakageResult leakage;             ///< By rays.
   std::optional<WaveLeakage> waves;  ///< Where the light model asks for them.
-  ChainWaves light = {};             ///< Of `waves`.
-  std::string light_words;           ///< By what the part is judged, and why.
-  std::vector<PictureBlur> blurs;    ///< Of light and part.
-  Haze haze;                         ///< Of the part; none where its roughness is not stated.
-  std::string haze_words;            ///< What it scatters, or that it is not counted.
-  SamplingCheck sampling;            ///< Of the part.
-  std::vector<LeakPlace> places;     ///< Places that leak most, worst first.
+  /// Of a lens for two pictures: designed and part on its second screen, by rays, without haze.
+  std::optional<LeakageResult> second;
+  ChainWaves light = {};           ///< Of `waves`.
+  std::string light_words;         ///< By what the part is judged, and why.
+  std::vector<PictureBlur> blurs;  ///< Of light and part.
+  Haze haze;                       ///< Of the part; none where its roughness is not stated.
+  std::string haze_words;          ///< What it scatters, or that it is not counted.
+  SamplingCheck sampling;          ///< Of the part.
+  std::vector<LeakPlace> places;   ///< Places that leak most, worst first.
   CreaseMap creases;
   ReportMap height;              ///< Part − designed, µm.
   LensRaster surface;            ///< Heights of the part, mm.
   SurfaceMesh milled;            ///< The surface as milled, at kMeshSpacing.
   LayeredImage surfaces;         ///< Designed but polished, and the part: PartLayers.
   ToleranceForecast tolerances;  ///< Empty unless requested.
+  std::vector<FaceError> faces;  ///< Of a lens whose two faces are cut; else empty.
 
   /// By what the part is judged.
   [[nodiscard]] const LeakageResult& judged() const { return waves ? waves->result : leakage; }

@@ -94,11 +94,14 @@ struct SetupSheet {
   std::string up_words;                            ///< The faces that lie up and down.
   std::string length_words;                        ///< Explains how the tools' lengths get into Z.
   std::string z_words;                             ///< Where Z0 is and what lens z it is.
-  double sheet = 0.0;               ///< Thickness of the sheet to buy, mm; 0: not from a sheet.
-  std::string height_words;         ///< Explains how the blank gets its height.
-  double apron = 0.0;               ///< Width of the surface's continuation around the part, mm.
-  std::optional<Front> front;       ///< Of the blank, made before the first cut.
-  std::string front_words;          ///< Explains where it has to lie.
+  double sheet = 0.0;           ///< Thickness of the sheet to buy, mm; 0: not from a sheet.
+  std::string height_words;     ///< Explains how the blank gets its height.
+  double apron = 0.0;           ///< Width of the surface's continuation around the part, mm.
+  std::optional<Front> front;   ///< Of the blank, made before the first cut.
+  std::string front_words;      ///< Explains where it has to lie.
+  std::optional<double> frame;  ///< z of the flat rim around it that the blank lies on, mm.
+  double frame_width = 0.0;     ///< Of that rim, mm.
+  std::string other_words;      ///< How this setup follows that of the other face, if there is one.
   std::vector<NamedBox> keep_outs;  ///< Clamps and other regions closed to tools.
 };
 
@@ -160,20 +163,24 @@ struct ReportData {
   std::string program;  ///< "lensforge 0.1.0"
   std::string lens_id;  ///< Fingerprint of the design; left out if empty.
   std::string part;     ///< "lens", "mirror" or "mould"
+  bool front = false;   ///< The face where light enters the lens is cut.
 
-  Image target;                      ///< Linear light.
-  LeakageResult leakage;             ///< By rays: designed, chain and the other surfaces.
-  std::optional<WaveLeakage> waves;  ///< By waves: designed and chain.
-  std::string light_words;           ///< By what the part is judged, and why.
-  std::vector<PictureBlur> blurs;    ///< Of light and part, the light's first.
-  std::optional<ReportHaze> haze;    ///< Of the part, where its roughness is stated.
-  std::string haze_words;            ///< What it scatters, or that it is not counted.
-  SamplingCheck sampling;            ///< Of the part.
-  std::vector<ShownSurface> shown;   ///< Their pictures are shown side by side.
+  Image target;                         ///< Linear light.
+  LeakageResult leakage;                ///< By rays: designed, chain and the other surfaces.
+  std::optional<WaveLeakage> waves;     ///< By waves: designed and chain.
+  std::optional<LeakageResult> second;  ///< Of a lens for two pictures: on its second screen.
+  std::string face_words;           ///< Which faces the pictures show as made; empty for one face.
+  std::string light_words;          ///< By what the part is judged, and why.
+  std::vector<PictureBlur> blurs;   ///< Of light and part, the light's first.
+  std::optional<ReportHaze> haze;   ///< Of the part, where its roughness is stated.
+  std::string haze_words;           ///< What it scatters, or that it is not counted.
+  SamplingCheck sampling;           ///< Of the part.
+  std::vector<ShownSurface> shown;  ///< Their pictures are shown side by side.
   LeakageOptions leakage_options;
   Body body;                            ///< Of the part, or of the cast from a mould.
   double ghost = 0.0;                   ///< ghost_share(); 0 if no light passes the part.
   ToleranceForecast tolerances;         ///< Empty unless requested.
+  std::vector<FaceError> faces;         ///< Of a lens whose two faces are cut; else empty.
   std::string tolerance_hint;           ///< How to get it, or one that ranks its causes.
   std::vector<LeakPlace> places;        ///< Worst first.
   Eigen::Vector2d lens_size{0.0, 0.0};  ///< mm

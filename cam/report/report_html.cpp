@@ -158,6 +158,7 @@ std::string pictures(const ReportData& data) {
   figures += wave_figures(data);
   return element("div", "class=\"pictures\"", figures + leakage_figure(data.judged())) +
          element("p", "class=\"soft\"", escape_html(data.judged_words())) +
+         (data.face_words.empty() ? "" : element("p", "", escape_html(data.face_words))) +
          sampling_sentence(data.sampling);
 }
 
@@ -216,12 +217,13 @@ std::string work(const ReportData& data) {
 }
 
 std::string footer(const ReportData& data) {
+  std::string up = traits(data.body).transmits ? "entry face. " : "underside. ";
+  up += z_words(data.z_offset);
+  if (data.front) up = "face that the turned blank lies on";
   std::string text =
-      std::string(
-          "Lengths in mm, lens frame: origin at the part's lower left corner seen from "
-          "above, x right, y away, z up from the ") +
-      (traits(data.body).transmits ? "entry face" : "underside") + ". " + z_words(data.z_offset) +
-      ".";
+      "Lengths in mm, lens frame: origin at the part's lower left corner seen from above, x right, "
+      "y away, z up from the " +
+      up + ".";
   if (data.seconds > 0.0) text += " Made in " + decimal_text(data.seconds, 0) + " s.";
   return escape_html(text);
 }
@@ -357,7 +359,7 @@ std::string summary(const ReportData& data) {
 
 /// The page that draws the light: `view` writes it, so the command comes before the link.
 std::string view_link(const ReportData& data) {
-  if (data.leakage.steps.empty()) return "";
+  if (data.leakage.steps.empty() || data.front) return "";
   const std::string lens = escape_html(data.job);
   return element("p", "class=\"screen\"",
                  joined({"After <code>lensforge view ", lens, " --out ", lens,
@@ -367,7 +369,7 @@ std::string view_link(const ReportData& data) {
 
 /// What tells why a part differs from this forecast.
 std::string check_words(const ReportData& data) {
-  if (data.leakage.steps.empty()) return "";
+  if (data.leakage.steps.empty() || data.front) return "";
   const std::string lens = escape_html(data.job);
   return element("p", "",
                  joined({"Photograph the wall, then <code>lensforge check ", lens, " PHOTO --out ",
@@ -381,9 +383,9 @@ std::string report_html(const ReportData& data) {
   const std::string body =
       joined({summary(data), section::warnings(data), section::setup(data),
               section::operations(data), section::polish(data), section::leakage(data),
-              section::tolerances(data), section::light(data), section::maps(data),
-              section::view(data), view_link(data), check_words(data), section::choices(data),
-              section::certificates(data), section::parameters(data)});
+              section::tolerances(data), section::faces(data), section::light(data),
+              section::maps(data), section::view(data), view_link(data), check_words(data),
+              section::choices(data), section::certificates(data), section::parameters(data)});
   return html_page({data.job + " – cutting report", section::header(data), body,
                     section::footer(data), std::string(surface_view_script())});
 }

@@ -57,6 +57,7 @@ std::string polish(const ReportData& data);
 std::string certificates(const ReportData& data);
 std::string leakage(const ReportData& data);
 std::string tolerances(const ReportData& data);
+std::string faces(const ReportData& data);
 std::string maps(const ReportData& data);
 std::string view(const ReportData& data);
 std::string choices(const ReportData& data);

@@ -189,6 +189,8 @@ json setup_json(const SetupSheet& setup) {
              {"apron", setup.apron},         {"keep_outs", list(setup.keep_outs, box)},
              {"z_words", setup.z_words},     {"height_words", setup.height_words}};
   if (setup.sheet > 0.0) sheet["sheet_mm"] = setup.sheet;
+  if (!setup.other_words.empty()) sheet["two_setups"] = setup.other_words;
+  if (setup.frame) sheet["frame_z"] = *setup.frame;
   if (setup.front) {
     sheet["front"] = std::visit([](const auto& front) { return front_json(front); }, *setup.front);
   }
@@ -233,6 +235,19 @@ json tolerances_json(const ToleranceForecast& forecast) {
   if (forecast.has_dark) {
     object["contrast"] = quantiles_json(forecast.contrast);
     object["without_errors"]["contrast"] = number(forecast.nominal.contrast());
+  }
+  return object;
+}
+
+json face_error_json(const FaceError& error) {
+  json object{{"error", error.name},
+              {"amount", error.amount},
+              {"unit", error.unit},
+              {"mae_change", error.mae.front()},
+              {"leakage", error.leakage.front()}};
+  if (error.mae.size() > 1) {
+    object["second_mae_change"] = error.mae.back();
+    object["second_leakage"] = error.leakage.back();
   }
   return object;
 }
@@ -285,7 +300,17 @@ json report_json(const ReportData& data) {
                          {"surfaces", surfaces_json(data.waves->result)}};
     }
     if (!data.tolerances.empty()) report["tolerances"] = tolerances_json(data.tolerances);
+    if (!data.faces.empty()) {
+      report["faces"] = {{"words", face_error_words(data.faces)},
+                         {"errors", list(data.faces, face_error_json)}};
+    }
+    if (!data.face_words.empty()) report["face_words"] = data.face_words;
+    if (data.second) {
+      report["second"] = {{"leakage", leakage_json(data, *data.second)},
+                          {"surfaces", surfaces_json(*data.second)}};
+    }
   }
+  if (data.front) report["face"] = "front";
   return report;
 }
 

@@ -71,7 +71,9 @@ void draw_section(SvgWriter& svg, const DrawnView& view, const SetupSheet& setup
                                     {view.x(blank.min().x()), view.y(blank.max().y())}};
   for (int i = 0; i <= parts; ++i) {
     const double x = blank.min().x() + blank.sizes().x() * i / parts;
-    edge.emplace_back(view.x(x), view.y(front.height({x, y})));
+    const double in_blank = std::min(x - blank.min().x(), blank.max().x() - x);
+    const bool in_frame = setup.frame && in_blank <= setup.frame_width;
+    edge.emplace_back(view.x(x), view.y(in_frame ? *setup.frame : front.height({x, y})));
   }
   svg.polygon(edge, style);
 }
@@ -273,6 +275,7 @@ std::string warnings(const ReportData& data) {
 
 /// Description of the support under the part, as in the drawing.
 std::string nest_words(const SetupSheet& sheet) {
+  if (sheet.frame) return "Section through the middle; the table is below the frame";
   if (!sheet.front) return "The table is below";
   const bool sphere = std::holds_alternative<SphericalFront>(*sheet.front);
   return std::string("Section through the ") + (sphere ? "apex" : "middle") +
@@ -289,13 +292,16 @@ std::string setup(const ReportData& data) {
                            {"Which way up", sheet.up_words},
                            {"Program zero", sheet.zero_words}});
   if (!sheet.z_words.empty()) list.push_back({"Set Z", sheet.z_words});
-  list.insert(list.end(), {{"Z", z_words(data.z_offset)}, {"Tool length", sheet.length_words}});
+  // A front lies turned over.
+  if (!data.front) list.push_back({"Z", z_words(data.z_offset)});
+  list.push_back({"Tool length", sheet.length_words});
   if (sheet.apron > 0.0) {
     list.push_back({"Rim", joined({"the surface is cut ", decimal_text(sheet.apron, 2),
                                    " mm beyond the part on every side; ",
                                    "polish before that is cut or sawn off"})});
   }
-  if (sheet.front) list.push_back({"Front", sheet.front_words});
+  if (!sheet.front_words.empty()) list.push_back({"Front", sheet.front_words});
+  if (!sheet.other_words.empty()) list.push_back({"The other face", sheet.other_words});
   if (traits(data.body).reflects && data.part != "mould") {
     list.push_back({"To reflect",
                     "coat the polished surface, unless the blank is of a metal that "
@@ -507,6 +513,13 @@ std::string wave_words(const ReportData& data) {
          "part adds to it; “path” are chords, decimals and the pitch error together.";
 }
 
+/// The table of a lens for two pictures.
+std::string second_screen(const ReportData& data) {
+  if (!data.second) return "";
+  return element("h3", "style=\"margin-top:1.2rem\"", "On the second screen, by rays") +
+         quality_table(*data.second);
+}
+
 std::string leakage(const ReportData& data) {
   if (data.leakage.steps.empty()) return "";
   const LeakageOptions& o = data.leakage_options;
@@ -524,7 +537,8 @@ std::string leakage(const ReportData& data) {
            element("h3", "style=\"margin-top:1.2rem\"", "Leakage by cause") + cause_table(result);
   };
   const std::string model = element("p", "", escape_html(data.judged_words()));
-  const std::string about = element("p", "class=\"soft\"", escape_html(words));
+  const std::string about =
+      element("p", "class=\"soft\"", escape_html(words)) + second_screen(data);
   if (!data.waves) return html_section("Light and leakage", model + tables(data.leakage) + about);
   return html_section("Light and leakage",
                       model + tables(data.waves->result) +
@@ -665,6 +679,35 @@ std::string tolerances(const ReportData& data) {
                      what_matters(forecast, data.tolerance_hint) +
                      element("div", "class=\"maps\"", spread_figure(forecast)) +
                      element("p", "class=\"soft\"", escape_html(words)));
+}
+
+std::string faces(const ReportData& data) {
+  if (data.faces.empty()) return "";
+  std::vector<TableColumn> columns{{"error", false},
+                                   {"amount, ±", true},
+                                   {"changes the MAE by", true},
+                                   {"moves of the light", true}};
+  const bool two = data.faces.front().mae.size() > 1;
+  if (two) {
+    columns.push_back({"MAE on the second screen", true});
+    columns.push_back({"light there", true});
+  }
+  std::vector<Row> rows;
+  for (const FaceError& error : data.faces) {
+    Row row{error.name, trimmed_decimal(error.amount, 4) + " " + error.unit};
+    for (std::size_t k = 0; k < error.mae.size(); ++k) {
+      row.push_back(signed_decimal(error.mae[k], kMaeDecimals + 1));
+      row.push_back(percent_text(error.leakage[k]));
+    }
+    rows.push_back(std::move(row));
+  }
+  const std::string words =
+      "Each error alone moves the designed front against the designed back, as the workshop’s "
+      "[tolerances] bound it (face_…), both ways; the worse is shown.";
+  return html_section("The faces against each other",
+                      element("p", "", element("b", "", face_error_words(data.faces))) +
+                          stacked(columns, rows) +
+                          element("p", "class=\"soft\"", escape_html(words)));
 }
 
 }  // namespace lensforge::report_section

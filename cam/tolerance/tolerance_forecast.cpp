@@ -1,16 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cam/tolerance/tolerance_forecast.h"
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <memory>
+#include <numbers>
+#include <utility>
+#include <variant>
 
+#include "cam/leakage/render_field.h"
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/part_model.h"
 #include "core/error.h"
+#include "core/lens/lens.h"
+#include "core/lens/surface_field.h"
+#include "core/optics/front.h"
 #include "core/page/html_page.h"
 #include "core/text/number_text.h"
+#include "core/text/words.h"
 
 namespace lensforge {
 
@@ -201,6 +213,129 @@ std::string tolerance_words(const ToleranceForecast& forecast) {
       "an MAE of " + decimal_text(forecast.mae.p10, 4) + " to " + decimal_text(forecast.mae.p90, 4);
   words += ".";
   return forecast.causes.empty() ? words : words + " " + most_words(forecast);
+}
+
+namespace {
+
+/// Rays per pixel of an even picture each way, for the pictures of smooth faces.
+constexpr double kRaysPerPixel = 6.0;
+
+constexpr double kRadians = std::numbers::pi / 180.0;
+
+/// A displacement of the front, in the directions of FaceError.
+struct FaceMove {
+  Eigen::Vector2d shift{0.0, 0.0};  ///< mm
+  double turn = 0.0;                ///< About z, rad.
+  Eigen::Vector2d tilt{0.0, 0.0};   ///< About x and y, rad.
+  double thickness = 0.0;           ///< mm
+};
+
+/// The front after small displacements about the lens's middle.
+HeightFront displaced(const HeightFront& front, const FaceMove& move) {
+  const FrontSurface surface(front);
+  const Eigen::Vector2d middle = front.corner + 0.5 * front.size;
+  const Eigen::Rotation2Dd back(-move.turn);
+  HeightGrid grid = front.spline->grid();
+  const Eigen::Vector2d step =
+      front.size.cwiseQuotient(Eigen::Vector2d(grid.columns - 1, grid.rows - 1));
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      const Eigen::Vector2d at =
+          front.corner + step.cwiseProduct(Eigen::Vector2d(column, grid.rows - 1 - row));
+      const Eigen::Vector2d from = at - middle;
+      const double z = surface.height(middle + back * from) + move.tilt.x() * from.y() -
+                       move.tilt.y() * from.x() - move.thickness;
+      grid.heights[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns) +
+                   static_cast<std::size_t>(column)] = static_cast<float>(z);
+    }
+  }
+  return {std::make_shared<const HeightSpline>(std::move(grid)), front.size,
+          front.corner + move.shift};
+}
+
+/// A screen with the designed picture on it.
+struct FaceScreen {
+  FieldRenderSetup setup;
+  const Image& target;
+  FluxPicture designed;
+};
+
+struct NamedMove {
+  const char* name;
+  double amount;
+  const char* unit;
+  FaceMove move;
+};
+
+std::vector<NamedMove> moves_of(const Tolerances& t) {
+  const double turn = kRadians * t.face_turn_deg;
+  const double tilt = kRadians * t.face_tilt_deg;
+  return {{"shift along x", t.face_shift, "mm", {.shift = {t.face_shift, 0.0}}},
+          {"shift along y", t.face_shift, "mm", {.shift = {0.0, t.face_shift}}},
+          {"turn about z", t.face_turn_deg, "°", {.turn = turn}},
+          {"tilt about x", t.face_tilt_deg, "°", {.tilt = {tilt, 0.0}}},
+          {"tilt about y", t.face_tilt_deg, "°", {.tilt = {0.0, tilt}}},
+          {"thickness", t.face_thickness, "mm", {.thickness = t.face_thickness}}};
+}
+
+FaceMove reversed(const FaceMove& move) {
+  return {-move.shift, -move.turn, -move.tilt, -move.thickness};
+}
+
+}  // namespace
+
+double FaceError::worst() const { return *std::max_element(mae.begin(), mae.end()); }
+
+std::vector<FaceError> face_errors(const Lens& lens, const SurfaceField& back,
+                                   const FieldRenderSetup& setup, const Tolerances& tolerances,
+                                   const Executor& executor, const RunControl& control) {
+  const auto& front = std::get<HeightFront>(setup.optics.front.value());
+  FieldRenderSetup even = setup;
+  even.grid =
+      lens_grid(lens.setup.lens_size, Eigen::Vector2d(lens.setup.lens_size.cwiseQuotient(
+                                          kRaysPerPixel * lens.setup.pixels.cast<double>())));
+  const RunControl silent(control.stop_token(), {});
+  std::vector<FaceScreen> screens;
+  screens.push_back({even, lens.target, render_field(back, even, executor, silent)});
+  if (lens.second) {
+    even.optics = on_second_screen(even.optics);
+    screens.push_back({even, lens.second->target, render_field(back, even, executor, silent)});
+  }
+  const std::vector<NamedMove> moves = moves_of(tolerances);
+  std::vector<FaceError> errors;
+  for (const NamedMove& one : moves) {
+    FaceError error{one.name, one.amount, one.unit, {}, {}};
+    for (FaceScreen& screen : screens) {
+      const PictureJudge judge(screen.target, screen.designed, {});
+      const double before = judge.judge(screen.designed).metrics.mae;
+      PictureQuality worst;
+      for (const FaceMove& move : {one.move, reversed(one.move)}) {
+        screen.setup.optics.front = displaced(front, move);
+        const PictureQuality moved =
+            judge.judge(render_field(back, screen.setup, executor, silent));
+        if (moved.metrics.mae >= worst.metrics.mae) worst = moved;
+      }
+      error.mae.push_back(worst.metrics.mae - before);
+      error.leakage.push_back(worst.leakage);
+    }
+    errors.push_back(std::move(error));
+    control.report({"errors between the faces", static_cast<double>(errors.size()),
+                    static_cast<double>(moves.size()), one.name});
+  }
+  std::stable_sort(errors.begin(), errors.end(),
+                   [](const FaceError& a, const FaceError& b) { return a.worst() > b.worst(); });
+  return errors;
+}
+
+std::string face_error_words(const std::vector<FaceError>& errors) {
+  const FaceError& most = errors.front();
+  const auto at = static_cast<std::size_t>(std::max_element(most.mae.begin(), most.mae.end()) -
+                                           most.mae.begin());
+  return joined({"Of errors between the faces the ", most.name,
+                 " matters most: ", trimmed_decimal(most.amount, 4),
+                 most.unit == "mm" ? " mm" : most.unit, " change the MAE ",
+                 at > 0 ? "on the second screen " : "", "by ", decimal_text(most.mae[at], 4),
+                 " and move ", percent_text(most.leakage[at]), " of the light."});
 }
 
 }  // namespace lensforge

@@ -167,6 +167,14 @@ struct Tolerances {
   double expansion_per_k = 7e-5;  ///< Of the material's lengths.
   double index_per_k = -1.05e-4;  ///< Of the material's refractive index.
 
+  // Of the front against the back where both are cut, in two setups; each ±. Assumed: edges are
+  // found to 0.01 mm, but a milled edge is straight and square to some hundredths, and a blank that
+  // lies on chips of 0.01 mm is tilted by as much over its width.
+  double face_shift = 0.03;      ///< Along x and along y, mm, ≥ 0.
+  double face_turn_deg = 0.05;   ///< About z, degrees, ≥ 0: 0.04 mm over an edge of 50 mm.
+  double face_tilt_deg = 0.02;   ///< About x and about y, degrees, ≥ 0: 0.01 mm over 30 mm.
+  double face_thickness = 0.02;  ///< mm, ≥ 0: of two touch-offs.
+
   friend bool operator==(const Tolerances&, const Tolerances&) = default;
 };
 

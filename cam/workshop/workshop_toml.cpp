@@ -251,6 +251,14 @@ void describe(Description& d, Tolerances& t) {
   d.number("temperature_k", t.temperature_k, {0.0, 100.0}, "K", "K, of the part, +- this");
   d.number("expansion_per_k", t.expansion_per_k, {0.0, 1e-3}, "", "share of a length");
   d.number("index_per_k", t.index_per_k, {-1e-3, 1e-3}, "", "of the refractive index");
+  d.length("face_shift", t.face_shift, {0.0, 1.0},
+           "mm, of the front against the back where both are cut, along x and along y, +- this");
+  d.number("face_turn_deg", t.face_turn_deg, {0.0, 10.0}, "degrees",
+           "degrees, the same about z, +- this");
+  d.number("face_tilt_deg", t.face_tilt_deg, {0.0, 10.0}, "degrees",
+           "degrees, the same about x and about y, +- this");
+  d.length("face_thickness", t.face_thickness, {0.0, 1.0},
+           "mm, thickness between both faces, +- this");
   d.list("waviness", t.waviness,
          "Waves that the machine's axes leave in the surface; rms_um = 0 for none.");
 }

@@ -83,8 +83,9 @@ bool belongs_to_lens(const fs::path& path) {
   const fs::path folder = folder_of(path);
   if (is_one_of(path.filename(), lens_file::kAll) && holds_lens(folder)) return true;
   const fs::path name = path.filename();
-  return folder.filename() == lens_file::kCut &&
-         (is_one_of(name, lens_file::kCutFiles) || is_one_of(name, lens_file::kCutLayers)) &&
+  const bool cut =
+      folder.filename() == lens_file::kCut || folder.filename() == lens_file::kFrontCut;
+  return cut && (is_one_of(name, lens_file::kCutFiles) || is_one_of(name, lens_file::kCutLayers)) &&
          holds_lens(folder.parent_path());
 }
 

@@ -64,6 +64,7 @@ inline constexpr const char* kStaging = "lens";
 
 /// The subfolder that `cam` writes into, and its files other than the programs.
 inline constexpr const char* kCut = "cam";
+inline constexpr const char* kFrontCut = "cam-front";  ///< The same for `cam --face front`.
 inline constexpr std::array kCutFiles = {"report.html", "report.json", "compare.html", "milled.ply",
                                          "milled.png",  "wall.png",    "leakage.png"};
 

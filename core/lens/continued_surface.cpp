@@ -13,8 +13,47 @@
 
 #include "core/error.h"
 #include "core/lens/smooth_surface.h"
+#include "core/optics/front.h"
 
 namespace lensforge {
+namespace {
+
+/// From coefficients c_{−1} … c_n of lines, a line a column, on knots at all whole numbers to those
+/// on knots with fourfold ends (Boehm's knot insertion): the value at the end, (2 c_0 + c_1) / 3,
+/// c_1, ...
+Eigen::MatrixXd clamped(const Eigen::MatrixXd& c) {
+  const Eigen::Index last = c.rows() - 1;
+  Eigen::MatrixXd result = c;
+  result.row(0) = (c.row(0) + 4.0 * c.row(1) + c.row(2)) / 6.0;
+  result.row(1) = (2.0 * c.row(1) + c.row(2)) / 3.0;
+  result.row(last) = (c.row(last) + 4.0 * c.row(last - 1) + c.row(last - 2)) / 6.0;
+  result.row(last - 1) = (2.0 * c.row(last - 1) + c.row(last - 2)) / 3.0;
+  return result;
+}
+
+}  // namespace
+
+ControlNet net_of(const HeightFront& front) {
+  const HeightGrid& grid = front.spline->grid();
+  ControlNet net{{grid.columns + 2, grid.rows + 2}, {}};
+  Eigen::MatrixXd z(net.shape.columns, net.shape.rows);
+  for (int j = 0; j < net.shape.rows; ++j) {
+    for (int i = 0; i < net.shape.columns; ++i) z(i, j) = front.spline->coefficient(i - 1, j - 1);
+  }
+  z = clamped(clamped(z).transpose()).transpose().eval();
+  const Eigen::Vector2i cells = net.cells();
+  const Eigen::Vector2d step = front.size.cwiseQuotient(cells.cast<double>());
+  net.points.resize(3, z.size());
+  for (int j = 0; j < net.shape.rows; ++j) {
+    for (int i = 0; i < net.shape.columns; ++i) {
+      net.points.col(j * net.shape.columns + i)
+          << front.corner.x() + step.x() * greville_point(i, cells.x()),
+          front.corner.y() + step.y() * greville_point(j, cells.y()), z(i, j);
+    }
+  }
+  return net;
+}
+
 namespace {
 
 /// Vertices of the rim are at most this far from their side, mm: twice what a mesh's rim may

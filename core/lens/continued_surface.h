@@ -5,8 +5,15 @@
 #include <memory>
 
 #include "core/lens/optical_surface.h"
+#include "core/spline/control_net.h"
 
 namespace lensforge {
+
+struct HeightFront;
+
+/// A height map over its rectangle in the form of a lens's spline: the same surface, with fourfold
+/// end knots.
+ControlNet net_of(const HeightFront& front);
 
 /// A surface's curvature across its rim, as it runs out beyond it: at the distance t it is
 /// (1 − t / length)³ times that at the rim.

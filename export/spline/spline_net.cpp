@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/lens/continued_surface.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/outline.h"
 #include "core/spline/control_net.h"
@@ -273,38 +274,17 @@ double volume(const HeightFront& front, const Eigen::AlignedBox2d& box) {
   return sum;
 }
 
-/// From coefficients c_{−1} … c_n of lines, a line a column, on knots at all whole numbers to those
-/// on knots with fourfold ends (Boehm's knot insertion): the value at the end, (2 c_0 + c_1) / 3,
-/// c_1, ...
-Eigen::MatrixXd clamped(const Eigen::MatrixXd& c) {
-  const Eigen::Index last = c.rows() - 1;
-  Eigen::MatrixXd result = c;
-  result.row(0) = (c.row(0) + 4.0 * c.row(1) + c.row(2)) / 6.0;
-  result.row(1) = (2.0 * c.row(1) + c.row(2)) / 3.0;
-  result.row(last) = (c.row(last) + 4.0 * c.row(last - 1) + c.row(last - 2)) / 6.0;
-  result.row(last - 1) = (2.0 * c.row(last - 1) + c.row(last - 2)) / 3.0;
-  return result;
-}
-
 }  // namespace
 
 SplinePatch patch_of(const HeightFront& front) {
-  const HeightGrid& grid = front.spline->grid();
+  const ControlNet net = net_of(front);
   SplinePatch patch;
   patch.box = {front.corner, Eigen::Vector2d(front.corner + front.size)};
-  patch.cells_u = grid.columns - 1;
-  patch.cells_v = grid.rows - 1;
-  auto& [x, y, z] = patch.coefficients;
-  for (Eigen::MatrixXd* const axis : {&x, &y, &z}) axis->resize(grid.columns + 2, grid.rows + 2);
-  const Eigen::Vector2d step = front.size.cwiseQuotient(patch.cells());
-  for (int j = 0; j < grid.rows + 2; ++j) {
-    for (int i = 0; i < grid.columns + 2; ++i) {
-      x(i, j) = front.corner.x() + step.x() * greville_point(i, patch.cells_u);
-      y(i, j) = front.corner.y() + step.y() * greville_point(j, patch.cells_v);
-      z(i, j) = front.spline->coefficient(i - 1, j - 1);
-    }
+  patch.cells_u = net.cells().x();
+  patch.cells_v = net.cells().y();
+  for (int axis = 0; axis < 3; ++axis) {
+    patch.coefficients[static_cast<std::size_t>(axis)] = net.table(axis);
   }
-  z = clamped(clamped(z).transpose()).transpose().eval();
   return patch;
 }
 

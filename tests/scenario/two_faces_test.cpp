@@ -78,6 +78,23 @@ TEST_F(TwoFaces, ProjectBothPicturesAsAnIndependentTraceFromTheFrontFinds) {
   ASSERT_EQ(between.exit_code, 0) << between.err;
   EXPECT_GT(between.json()["flux_inside"].get<double>(), 0.8);
   EXPECT_THAT(run({"info", path("lens")}).out, HasSubstr("second wall   z = 120.00 mm"));
+
+  // Both faces are cut, the front first, into folders of their own.
+  const Arguments cut{"cam", path("lens"), "--pitch", "0.2mm", "--no-render", "--quiet"};
+  const auto with = [&cut](const Arguments& more) {
+    Arguments all = cut;
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  expect_refusal(run(with({"--face", "front"})), 2, {"stock.margin 3", "--margin ", "works"});
+  EXPECT_FALSE(fs::exists(at("lens/cam-front")));
+  const Outcome front = run(with({"--face", "front", "--margin", "9mm"}));
+  ASSERT_EQ(front.exit_code, 0) << front.err;
+  EXPECT_THAT(content(at("lens/cam-front/finish.ngc")), HasSubstr("setup 1 of 2"));
+  EXPECT_FALSE(fs::exists(at("lens/cam")));
+  const Outcome back = run(with({"--z-zero", "table", "--margin", "9mm"}));
+  ASSERT_EQ(back.exit_code, 0) << back.err;
+  EXPECT_THAT(content(at("lens/cam/finish.ngc")), HasSubstr("setup 2 of 2"));
 }
 
 /// A design of one picture at short distance.

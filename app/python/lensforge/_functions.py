@@ -72,6 +72,8 @@ def render(lens, **options):
 def cam(lens, *, progress=None, **options):
     """Makes the programs that mill a lens, the milled surface and a report, in the folder's cam/.
 
+    With face="front" those of its front, in cam-front/.
+
     lens: a saved Lens or a lens folder's path; progress: as in design(). Returns a dict of "files",
     "warnings" and "report", as report.json has it. The options are those of lensforge cam:
     """
