@@ -12,7 +12,7 @@ target_compile_options(lensforge_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast)
 # Contraction stays off so that the same source gives the same bits at every optimisation level.
 target_compile_options(lensforge_options INTERFACE -ffp-contract=off -fno-math-errno)
-# Vectors of several numbers (design/flux/lanes.h) are never passed: everything that takes them is inlined.
+# Vectors of several numbers (core/compute/lanes.h) are never passed: everything that takes them is inlined.
 target_compile_options(lensforge_options INTERFACE -Wno-psabi)
 # The Python module is a shared library of the same rooms.
 target_compile_options(lensforge_options INTERFACE -fPIC -fno-semantic-interposition)

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <utility>
 
+#include "core/compute/lanes.h"
 #include "core/error.h"
 
 namespace lensforge {
@@ -105,5 +106,12 @@ double dot(const Executor& executor, std::span<const double> a, std::span<const 
 #if !defined(LENSFORGE_CUDA)  // cuda/gpu.cu has it then.
 Gpu find_gpu() { return {false, "", "this build has no CUDA"}; }
 #endif
+
+Lanes widest_lanes() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2") != 0) return Lanes::kFour;
+#endif
+  return Lanes::kTwo;
+}
 
 }  // namespace lensforge

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <type_traits>
+
 /// Marks a per-item function that runs on the CPU and, compiled by nvcc, on the GPU as well.
 #if defined(__CUDACC__)
 #define LF_HD __host__ __device__
@@ -27,8 +29,10 @@ namespace lensforge {
 
 /// min(max(x, low), high), low for a NaN. std::fmin() and std::fmax() compile to calls because of
 /// their NaN rules; this compiles to two instructions.
-LF_HD LF_INLINE double clamped(double x, double low, double high) {
-  const double raised = x > low ? x : low;
+template <class T>
+LF_HD LF_INLINE T clamped(const T& x, const std::type_identity_t<T>& low,
+                          const std::type_identity_t<T>& high) {
+  const T raised = x > low ? x : low;
   return raised < high ? raised : high;
 }
 

@@ -14,10 +14,12 @@ namespace lensforge {
 constexpr std::size_t index_of(std::int64_t value) { return static_cast<std::size_t>(value); }
 
 /// A function of one variable: value and slope.
-struct ValueSlope {
-  double value = 0.0;
-  double slope = 0.0;
+template <class T>
+struct ValueSlopeOf {
+  T value{};
+  T slope{};
 };
+using ValueSlope = ValueSlopeOf<double>;
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

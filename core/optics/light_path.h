@@ -5,8 +5,10 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 
 #include "core/compute/host_device.h"
+#include "core/compute/lanes.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/light_source.h"
 #include "core/optics/optical_setup.h"
@@ -20,27 +22,33 @@ namespace lensforge {
 // a unit direction of the light before the surface (inside a lens); b unit direction of the ray
 // after it, m its slope (dx/dz, dy/dz); u landing point in pixel coordinates. A bar (…_bar) is a
 // derivative by that quantity. `known` holds the results of ray_to() for the same points, so
-// repeated calls need not solve for them again.
+// repeated calls need not solve for them again. T is a double, or a vector of the doubles of
+// several rays or facets (core/compute/lanes.h), each with the same bits: for light that
+// takes_lanes().
 
 /// Light after a plane facet. Parallel light leaves it as one beam; light from a point has a beam
 /// for each corner.
-struct FacetBeam {
-  RefractedBeam b0;
-  RefractedBeam b1;
-  RefractedBeam b2;
+template <class T>
+struct FacetBeamOf {
+  RefractedBeamOf<T> b0;
+  RefractedBeamOf<T> b1;
+  RefractedBeamOf<T> b2;
   CornerRays known;
 
-  [[nodiscard]] LF_HD const Eigen::Vector2d& slope(int corner) const {
+  [[nodiscard]] LF_HD LF_INLINE const PlaneVector<T>& slope(int corner) const {
     return corner == 0 ? b0.m : (corner == 1 ? b1.m : b2.m);
   }
 };
+using FacetBeam = FacetBeamOf<double>;
 
 /// Derivatives by the slopes at a facet's three corners.
-struct FacetSlopes {
-  Eigen::Vector2d m0{0.0, 0.0};
-  Eigen::Vector2d m1{0.0, 0.0};
-  Eigen::Vector2d m2{0.0, 0.0};
+template <class T>
+struct FacetSlopesOf {
+  PlaneVector<T> m0{T{}, T{}};
+  PlaneVector<T> m1{T{}, T{}};
+  PlaneVector<T> m2{T{}, T{}};
 };
+using FacetSlopes = FacetSlopesOf<double>;
 
 /// The path of the light from the lamp to the screen. Everything that depends on the kind of
 /// source, on refraction or reflection, and on the screen is computed here; no other room uses the
@@ -77,6 +85,9 @@ class LightPath {
 
   /// True if the light's direction differs from point to point and must be solved for.
   [[nodiscard]] LF_HD bool varies() const { return source_.varies(); }
+  /// True if several rays or facets can be computed at a time: parallel light on a mirror or behind
+  /// a flat front, without losses by reflection.
+  [[nodiscard]] bool takes_lanes() const { return !varies() && !loses(); }
   /// The ray that reaches p. @pre varies().
   [[nodiscard]] LF_HD IncidentRay ray_to(const Eigen::Vector3d& p) const {
     return source_.ray_to(p);
@@ -84,13 +95,16 @@ class LightPath {
 
   /// True if a surface of this normal sends the light towards the screen. Rays along +z then do not
   /// meet the height field again (Sun et al., Appendix B).
-  [[nodiscard]] LF_HD bool transmits(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
-                                     const IncidentRay* known = nullptr) const {
-    if (source_.along_z()) {
-      return n.z() > 0.0 && refracted_cosine_squared(n.z(), eta_) > 0.0 &&
-             (!screen_.turned() || screen_.faces(RefractedBeam(n, eta_).m));
-    }
-    return leaves(source_.incident(p, known), n);
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE MaskOf<T> transmits(const SpaceVector<T>& p,
+                                                    const SpaceVector<T>& n,
+                                                    const IncidentRay* known = nullptr) const {
+    if (!source_.along_z()) return leaves<T>(incident<T>(p, known), n);
+    MaskOf<T> transmits = n.z() > T{};
+    transmits = transmits & (refracted_cosine_squared<T>(n.z(), eta_) > T{});
+    if (!screen_.turned()) return transmits;
+    transmits = transmits & screen_.is_towards<T>(RefractedBeamOf<T>(n, eta_).m);
+    return transmits;
   }
   /// The same for a whole facet.
   [[nodiscard]] LF_HD bool transmits(const Corners& t, const Eigen::Vector3d& n,
@@ -103,90 +117,105 @@ class LightPath {
   /// Barrier that keeps a facet's light from being lost; infinite if no light leaves. For a lens
   /// f_tir (Sun et al., Eq. 9), for a mirror 1 / (−n·a b_z); for light from a point the mean over
   /// the corners.
-  [[nodiscard]] LF_HD double barrier(const Corners& t, const Eigen::Vector3d& n,
-                                     const CornerRays& known = {}) const {
-    if (source_.along_z()) return barrier_along_z(n).value;
-    if (!source_.varies()) return barrier_value(source_.direction(), n);
-    return varied_barrier(t, n, known);
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE T barrier(const CornersOf<T>& t, const SpaceVector<T>& n,
+                                          const CornerRays& known = {}) const {
+    if (source_.along_z()) return barrier_along_z<T>(n).value;
+    if constexpr (std::is_same_v<T, double>) {
+      if (source_.varies()) return varied_barrier(t, n, known);
+    }
+    return barrier_value<T>(in_all_lanes<T>(source_.direction()), n);
   }
   /// Adjoint of barrier(): adds weight × the derivatives by corners and normal, returns barrier().
   /// @pre barrier() is finite.
-  LF_HD double barrier_adjoint(const Corners& t, const Eigen::Vector3d& n, double weight,
-                               Corners& t_bar, Eigen::Vector3d& n_bar,
-                               const CornerRays& known = {}) const {
+  template <class T = double>
+  LF_HD LF_INLINE T barrier_adjoint(const CornersOf<T>& t, const SpaceVector<T>& n, double weight,
+                                    CornersOf<T>& t_bar, SpaceVector<T>& n_bar,
+                                    const CornerRays& known = {}) const {
     if (source_.along_z()) {
-      const ValueSlope f = barrier_along_z(n);
+      const ValueSlopeOf<T> f = barrier_along_z<T>(n);
       n_bar.z() += weight * f.slope;
       return f.value;
     }
-    if (!source_.varies()) {
-      const BarrierAt f = barrier_at(source_.direction(), n);
-      n_bar += weight * f.by_n;
-      return f.value;
+    if constexpr (std::is_same_v<T, double>) {
+      if (source_.varies()) return varied_barrier_adjoint(t, n, weight, t_bar, n_bar, known);
     }
-    return varied_barrier_adjoint(t, n, weight, t_bar, n_bar, known);
+    const BarrierAt<T> f = barrier_at<T>(in_all_lanes<T>(source_.direction()), n);
+    n_bar += weight * f.by_n;
+    return f.value;
   }
 
   /// The ray after the surface. @pre transmits(p, n).
-  [[nodiscard]] LF_HD RefractedBeam beam(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
-                                         const IncidentRay* known = nullptr) const {
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE RefractedBeamOf<T> beam(const SpaceVector<T>& p,
+                                                        const SpaceVector<T>& n,
+                                                        const IncidentRay* known = nullptr) const {
     if (source_.along_z()) return {n, eta_};
-    const Eigen::Vector3d a = source_.incident(p, known);
-    if (reflects()) return RefractedBeam::reflected(a, n);
+    const SpaceVector<T> a = incident<T>(p, known);
+    if (reflects()) return RefractedBeamOf<T>::reflected(a, n);
     return {a, n, eta_};
   }
   /// Adjoint of (p, n) ↦ beam.m: adds to p_bar, returns n_bar.
-  [[nodiscard]] LF_HD Eigen::Vector3d beam_adjoint(const Eigen::Vector3d& p,
-                                                   const Eigen::Vector3d& n,
-                                                   const RefractedBeam& beam,
-                                                   const Eigen::Vector2d& m_bar,
-                                                   Eigen::Vector3d& p_bar,
-                                                   const IncidentRay* known = nullptr) const {
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> beam_adjoint(
+      const SpaceVector<T>& p, const SpaceVector<T>& n, const RefractedBeamOf<T>& beam,
+      const PlaneVector<T>& m_bar, SpaceVector<T>& p_bar,
+      const IncidentRay* known = nullptr) const {
     if (source_.along_z()) return beam.adjoint(n, eta_, m_bar);
-    const Eigen::Vector3d a = source_.incident(p, known);
-    const Eigen::Vector3d b_bar = beam.direction_bar(m_bar);
+    const SpaceVector<T> a = incident<T>(p, known);
+    const SpaceVector<T> b_bar = beam.direction_bar(m_bar);
     if (reflects()) {
-      if (source_.varies()) {
-        p_bar += source_.incident_adjoint(p, reflect_adjoint_by_incident(n, b_bar), known);
+      if constexpr (std::is_same_v<T, double>) {
+        if (source_.varies()) {
+          p_bar += source_.incident_adjoint(p, reflect_adjoint_by_incident(n, b_bar), known);
+        }
       }
-      return reflect_adjoint(a, n, b_bar);
+      return reflect_adjoint<T>(a, n, b_bar);
     }
-    const double along = n.dot(b_bar) * beam.k_by_cosine(n.dot(a), eta_);
-    if (source_.varies()) p_bar += source_.incident_adjoint(p, eta_ * b_bar + along * n, known);
+    const T along = n.dot(b_bar) * beam.k_by_cosine(n.dot(a), eta_);
+    if constexpr (std::is_same_v<T, double>) {
+      if (source_.varies()) p_bar += source_.incident_adjoint(p, eta_ * b_bar + along * n, known);
+    }
     return beam.k * b_bar + along * a;
   }
   /// The rays after a facet. @pre transmits(t, n).
-  [[nodiscard]] LF_HD FacetBeam facet_beam(const Corners& t, const Eigen::Vector3d& n,
-                                           const CornerRays& known = {}) const {
-    const RefractedBeam first = beam(t.v0, n, known.r0);
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE FacetBeamOf<T> facet_beam(const CornersOf<T>& t,
+                                                          const SpaceVector<T>& n,
+                                                          const CornerRays& known = {}) const {
+    const RefractedBeamOf<T> first = beam<T>(t.v0, n, known.r0);
     if (!source_.varies()) return {first, first, first, known};
-    return {first, beam(t.v1, n, known.r1), beam(t.v2, n, known.r2), known};
+    return {first, beam<T>(t.v1, n, known.r1), beam<T>(t.v2, n, known.r2), known};
   }
   /// Adjoint of (t, n) ↦ the slopes at the three corners: adds to t_bar, returns n_bar.
-  [[nodiscard]] LF_HD Eigen::Vector3d facet_beam_adjoint(const Corners& t, const Eigen::Vector3d& n,
-                                                         const FacetBeam& facet,
-                                                         const FacetSlopes& m_bar,
-                                                         Corners& t_bar) const {
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> facet_beam_adjoint(const CornersOf<T>& t,
+                                                                  const SpaceVector<T>& n,
+                                                                  const FacetBeamOf<T>& facet,
+                                                                  const FacetSlopesOf<T>& m_bar,
+                                                                  CornersOf<T>& t_bar) const {
     if (!source_.varies()) {
-      const Eigen::Vector2d sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
-      return beam_adjoint(t.v0, n, facet.b0, sum, t_bar.v0);
+      const PlaneVector<T> sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
+      return beam_adjoint<T>(t.v0, n, facet.b0, sum, t_bar.v0);
     }
     const CornerRays& rays = facet.known;
-    return beam_adjoint(t.v0, n, facet.b0, m_bar.m0, t_bar.v0, rays.r0) +
-           beam_adjoint(t.v1, n, facet.b1, m_bar.m1, t_bar.v1, rays.r1) +
-           beam_adjoint(t.v2, n, facet.b2, m_bar.m2, t_bar.v2, rays.r2);
+    return beam_adjoint<T>(t.v0, n, facet.b0, m_bar.m0, t_bar.v0, rays.r0) +
+           beam_adjoint<T>(t.v1, n, facet.b1, m_bar.m1, t_bar.v1, rays.r1) +
+           beam_adjoint<T>(t.v2, n, facet.b2, m_bar.m2, t_bar.v2, rays.r2);
   }
 
   /// Point where a ray of slope m from p meets the screen, in pixel coordinates.
-  [[nodiscard]] LF_HD Eigen::Vector2d land(const Eigen::Vector3d& p,
-                                           const Eigen::Vector2d& m) const {
-    return screen_.land(p, m);
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE PlaneVector<T> land(const SpaceVector<T>& p,
+                                                    const PlaneVector<T>& m) const {
+    return screen_.land<T>(p, m);
   }
   /// Adjoint of land(): adds to p_bar and m_bar for a given u_bar.
-  LF_HD void land_adjoint(const Eigen::Vector3d& p, const Eigen::Vector2d& m,
-                          const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar,
-                          Eigen::Vector2d& m_bar) const {
-    screen_.land_adjoint(p, m, u_bar, p_bar, m_bar);
+  template <class T = double>
+  LF_HD LF_INLINE void land_adjoint(const SpaceVector<T>& p, const PlaneVector<T>& m,
+                                    const PlaneVector<T>& u_bar, SpaceVector<T>& p_bar,
+                                    PlaneVector<T>& m_bar) const {
+    screen_.land_adjoint<T>(p, m, u_bar, p_bar, m_bar);
   }
   /// Distance of a surface point from the screen's plane, mm; negative beyond it.
   [[nodiscard]] double clearance(const Eigen::Vector3d& p) const { return screen_.clearance(p); }
@@ -197,9 +226,14 @@ class LightPath {
   /// measured where the rays enter. Moving a vertex inside a mesh does not change the sum over its
   /// triangles. If faces reflect, it is the light that the triangle lets out, by its own normal and
   /// the light at its middle, equal to the above at normal incidence.
-  [[nodiscard]] LF_HD double intake(const Corners& t, const CornerRays& known = {}) const {
-    const double even = source_.intake(t, known);
-    return loses() ? even * Passage(*this, t).share() : even;
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE T intake(const CornersOf<T>& t,
+                                         const CornerRays& known = {}) const {
+    const T even = source_.intake(t, known);
+    if constexpr (std::is_same_v<T, double>) {
+      if (loses()) return even * passed_share(t);
+    }
+    return even;
   }
   /// True if intake() is the plan area whatever the triangle's slope, so all cells of an even grid
   /// take in the same.
@@ -207,18 +241,21 @@ class LightPath {
 
   /// intake() as a share of a whole (Sun et al., Eq. 1): the intake of a flat surface of the lens's
   /// size (for parallel light inside its outline), or the argument of sharing().
-  [[nodiscard]] LF_HD double flux(const Corners& t, const CornerRays& known = {}) const {
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE T flux(const CornersOf<T>& t, const CornerRays& known = {}) const {
     return intake(t, known) * per_whole_;
   }
   /// Adjoint of flux(): adds to the derivatives by the corners, or by area_normal(t) if flux
   /// depends on that alone.
-  LF_HD void flux_adjoint(const Corners& t, double flux_bar, Corners& t_bar,
-                          Eigen::Vector3d& area_normal_bar, const CornerRays& known = {}) const {
-    const double bar = flux_bar * per_whole_;
-    if (!loses()) return source_.intake_adjoint(t, bar, t_bar, area_normal_bar, known);
-    const Passage passage(*this, t);
-    source_.intake_adjoint(t, bar * passage.share(), t_bar, area_normal_bar, known);
-    passage.adjoint(*this, bar * source_.intake(t, known), t_bar, area_normal_bar);
+  template <class T = double>
+  LF_HD LF_INLINE void flux_adjoint(const CornersOf<T>& t, const T& flux_bar, CornersOf<T>& t_bar,
+                                    SpaceVector<T>& area_normal_bar,
+                                    const CornerRays& known = {}) const {
+    const T bar = flux_bar * per_whole_;
+    if constexpr (std::is_same_v<T, double>) {
+      if (loses()) return lossy_intake_adjoint(t, bar, t_bar, area_normal_bar, known);
+    }
+    source_.intake_adjoint(t, bar, t_bar, area_normal_bar, known);
   }
 
   /// Gradient (∂z/∂x, ∂z/∂y) of the surface at p that sends its light to a point of the picture.
@@ -243,11 +280,23 @@ class LightPath {
 
  private:
   /// Value of a barrier at one point and its derivatives.
+  template <class T>
   struct BarrierAt {
-    double value;
-    Eigen::Vector3d by_a;
-    Eigen::Vector3d by_n;
+    T value;
+    SpaceVector<T> by_a;
+    SpaceVector<T> by_n;
   };
+
+  /// LightSource::incident(). @pre takes_lanes(), or T is a double.
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> incident(const SpaceVector<T>& p,
+                                                        const IncidentRay* known) const {
+    if constexpr (std::is_same_v<T, double>) {
+      return source_.incident(p, known);
+    } else {
+      return in_all_lanes<T>(source_.direction());
+    }
+  }
 
   /// Transmittance of both faces of a lens for the ray through a triangle's middle, relative to
   /// that at normal incidence.
@@ -291,6 +340,17 @@ class LightPath {
     ValueSlope back_{};
   };
 
+  [[nodiscard]] LF_HD LF_APART double passed_share(const Corners& t) const {
+    return Passage(*this, t).share();
+  }
+  LF_HD LF_APART void lossy_intake_adjoint(const Corners& t, double bar, Corners& t_bar,
+                                           Eigen::Vector3d& area_normal_bar,
+                                           const CornerRays& known) const {
+    const Passage passage(*this, t);
+    source_.intake_adjoint(t, bar * passage.share(), t_bar, area_normal_bar, known);
+    passage.adjoint(*this, bar * source_.intake(t, known), t_bar, area_normal_bar);
+  }
+
   /// Values of kind_: lens, lens whose faces reflect (OpticalSetup::fresnel), mirror.
   static constexpr std::int64_t kLens = 0;
   static constexpr std::int64_t kLosing = 1;
@@ -301,47 +361,54 @@ class LightPath {
   static std::int64_t kind_of(const MirrorBody&, bool /*fresnel*/) { return kMirror; }
   [[nodiscard]] LF_HD bool reflects() const { return kind_ == kMirror; }
   [[nodiscard]] LF_HD bool loses() const { return kind_ == kLosing; }
-  [[nodiscard]] LF_HD ValueSlope barrier_along_z(const Eigen::Vector3d& n) const {
-    if (screen_.turned() && !transmits(Eigen::Vector3d(0.0, 0.0, 0.0), n)) return {kInfinity, 0.0};
-    return reflection_barrier(n.z(), eta_);
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE ValueSlopeOf<T> barrier_along_z(const SpaceVector<T>& n) const {
+    const ValueSlopeOf<T> f = reflection_barrier<T>(n.z(), eta_);
+    if (!screen_.turned()) return f;
+    const T none{};
+    const MaskOf<T> transmits = this->transmits<T>(SpaceVector<T>(none, none, none), n);
+    return {transmits ? f.value : none + kInfinity, transmits ? f.slope : none};
   }
-  [[nodiscard]] LF_HD LF_INLINE double barrier_value(const Eigen::Vector3d& a,
-                                                     const Eigen::Vector3d& n) const {
-    if (!leaves(a, n)) return kInfinity;
-    const double c = n.dot(a);
-    if (!reflects()) return 1.0 / refracted_cosine_squared(c, eta_);
-    return -1.0 / (c * (a.z() - 2.0 * c * n.z()));
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE T barrier_value(const SpaceVector<T>& a,
+                                                const SpaceVector<T>& n) const {
+    const T c = n.dot(a);
+    const T value = reflects() ? -1.0 / (c * (a.z() - 2.0 * c * n.z()))
+                               : 1.0 / refracted_cosine_squared<T>(c, eta_);
+    return leaves<T>(a, n) ? value : T{} + kInfinity;
   }
   /// @pre leaves(a, n).
-  [[nodiscard]] LF_HD LF_INLINE BarrierAt barrier_at(const Eigen::Vector3d& a,
-                                                     const Eigen::Vector3d& n) const {
-    const double c = n.dot(a);
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE BarrierAt<T> barrier_at(const SpaceVector<T>& a,
+                                                        const SpaceVector<T>& n) const {
+    const T none{};
+    const T c = n.dot(a);
     if (!reflects()) {
-      const ValueSlope f = reflection_barrier(c, eta_);
+      const ValueSlopeOf<T> f = reflection_barrier<T>(c, eta_);
       return {f.value, f.slope * n, f.slope * a};
     }
     // f = −1 / (c b_z) with b_z = a_z − 2 c n_z.
-    const double b_z = a.z() - 2.0 * c * n.z();
-    const double f = -1.0 / (c * b_z);
-    const double by_bz = -f / b_z;
-    const double by_c = -f / c - 2.0 * n.z() * by_bz;
-    return {f, by_c * n + Eigen::Vector3d(0.0, 0.0, by_bz),
-            by_c * a + Eigen::Vector3d(0.0, 0.0, -2.0 * c * by_bz)};
+    const T b_z = a.z() - 2.0 * c * n.z();
+    const T f = -1.0 / (c * b_z);
+    const T by_bz = -f / b_z;
+    const T by_c = -f / c - 2.0 * n.z() * by_bz;
+    return {f, by_c * n + SpaceVector<T>(none, none, by_bz),
+            by_c * a + SpaceVector<T>(none, none, -2.0 * c * by_bz)};
   }
   /// A corner's share of barrier_adjoint().
   LF_HD LF_INLINE double corner_barrier(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
                                         double weight, Eigen::Vector3d& p_bar,
                                         Eigen::Vector3d& n_bar, const IncidentRay* known) const {
-    const BarrierAt f = barrier_at(source_.incident(p, known), n);
+    const BarrierAt<double> f = barrier_at<double>(source_.incident(p, known), n);
     p_bar += source_.incident_adjoint(p, weight * f.by_a, known);
     n_bar += weight * f.by_n;
     return f.value / 3.0;
   }
   [[nodiscard]] LF_HD LF_APART double varied_barrier(const Corners& t, const Eigen::Vector3d& n,
                                                      const CornerRays& known) const {
-    return (barrier_value(source_.incident(t.v0, known.r0), n) +
-            barrier_value(source_.incident(t.v1, known.r1), n) +
-            barrier_value(source_.incident(t.v2, known.r2), n)) /
+    return (barrier_value<double>(source_.incident(t.v0, known.r0), n) +
+            barrier_value<double>(source_.incident(t.v1, known.r1), n) +
+            barrier_value<double>(source_.incident(t.v2, known.r2), n)) /
            3.0;
   }
   LF_HD LF_APART double varied_barrier_adjoint(const Corners& t, const Eigen::Vector3d& n,
@@ -352,19 +419,25 @@ class LightPath {
            corner_barrier(t.v1, n, weight / 3.0, t_bar.v1, n_bar, known.r1) +
            corner_barrier(t.v2, n, weight / 3.0, t_bar.v2, n_bar, known.r2);
   }
-  [[nodiscard]] LF_HD LF_INLINE bool leaves(const Eigen::Vector3d& a,
-                                            const Eigen::Vector3d& n) const {
-    const double c = n.dot(a);
-    if (!(n.z() > 0.0)) return false;
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE MaskOf<T> leaves(const SpaceVector<T>& a,
+                                                 const SpaceVector<T>& n) const {
+    const T none{};
+    const T c = n.dot(a);
+    MaskOf<T> leaves = n.z() > none;
     if (reflects()) {
-      return c < 0.0 && a.z() - 2.0 * c * n.z() > 0.0 &&
-             (!screen_.turned() || screen_.faces(RefractedBeam::reflected(a, n).m));
+      leaves = leaves & (c < none) & (a.z() - 2.0 * c * n.z() > none);
+    } else {
+      // b_z = √s n_z − η (c n_z − a_z), compared without the root.
+      const T s = refracted_cosine_squared<T>(c, eta_);
+      const T back = eta_ * (c * n.z() - a.z());
+      const MaskOf<T> upwards = (back < none) | (s * n.z() * n.z() > back * back);
+      leaves = leaves & (c > none) & (s > none) & upwards;
     }
-    // b_z = √s n_z − η (c n_z − a_z), compared without the root.
-    const double s = refracted_cosine_squared(c, eta_);
-    const double back = eta_ * (c * n.z() - a.z());
-    return c > 0.0 && s > 0.0 && (back < 0.0 || s * n.z() * n.z() > back * back) &&
-           (!screen_.turned() || screen_.faces(RefractedBeam(a, n, eta_).m));
+    if (!screen_.turned()) return leaves;
+    leaves = leaves & screen_.is_towards<T>(reflects() ? RefractedBeamOf<T>::reflected(a, n).m
+                                                       : RefractedBeamOf<T>(a, n, eta_).m);
+    return leaves;
   }
 
   Screen screen_;

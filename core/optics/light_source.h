@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "core/compute/host_device.h"
+#include "core/compute/lanes.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/optics/front.h"
 #include "core/optics/optical_setup.h"
@@ -498,22 +500,30 @@ class LightSource {
   /// Light that a triangle takes in, mm²: the area of an evenly lit lens that takes in the same,
   /// measured where the rays enter; for a point source the solid angle, scaled to the middle of the
   /// lens.
-  [[nodiscard]] LF_HD double intake(const Corners& t, const CornerRays& known = {}) const {
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE T intake(const CornersOf<T>& t,
+                                         const CornerRays& known = {}) const {
     if (along_z()) return plan_area(t);
-    if (!varies()) return area_across(t);
-    return varied_intake(t, known);
+    if constexpr (std::is_same_v<T, double>) {
+      if (varies()) return varied_intake(t, known);
+    }
+    return area_across(t);
   }
   /// Adjoint of intake(): adds to the derivatives by the corners, or by area_normal(t) if the
   /// intake depends on that alone.
-  LF_HD void intake_adjoint(const Corners& t, double bar, Corners& t_bar,
-                            Eigen::Vector3d& area_normal_bar, const CornerRays& known = {}) const {
+  template <class T = double>
+  LF_HD LF_INLINE void intake_adjoint(const CornersOf<T>& t, const T& bar, CornersOf<T>& t_bar,
+                                      SpaceVector<T>& area_normal_bar,
+                                      const CornerRays& known = {}) const {
     if (along_z()) {
       area_normal_bar.z() += 0.5 * bar;
-    } else if (!varies()) {
-      area_normal_bar += (0.5 * bar / direction_.z()) * direction_;
-    } else {
-      varied_intake_adjoint(t, bar, t_bar, known);
+      return;
     }
+    if constexpr (std::is_same_v<T, double>) {
+      if (varies()) return varied_intake_adjoint(t, bar, t_bar, known);
+    }
+    const T by_direction = 0.5 * bar / direction_.z();
+    area_normal_bar += by_direction * in_all_lanes<T>(direction_);
   }
 
   /// intake() of a triangle whose rays enter at these points, and the derivatives by them.
@@ -543,8 +553,9 @@ class LightSource {
 
   [[nodiscard]] LF_HD bool lambertian() const { return lambertian_ != 0.0; }
   /// Area of a triangle across parallel light, scaled to an evenly lit lens.
-  [[nodiscard]] LF_HD double area_across(const Corners& t) const {
-    return 0.5 * area_normal(t).dot(direction_) / direction_.z();
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE T area_across(const CornersOf<T>& t) const {
+    return 0.5 * area_normal(t).dot(in_all_lanes<T>(direction_)) / direction_.z();
   }
   /// The straight ray from the source to p; p counts as the point where it enters.
   [[nodiscard]] LF_HD IncidentRay ray_in_air(const Eigen::Vector3d& p) const {
@@ -594,7 +605,7 @@ class LightSource {
     t_bar.v2 += vector_adjoint(t.v2, r_bar.c, known.r2);
   }
   [[nodiscard]] LF_HD LF_INLINE double intake_of_vectors(const VectorsBar& r) const {
-    if (kind_ == Kind::kParallelBent) return area_across({r.a, r.b, r.c});
+    if (kind_ == Kind::kParallelBent) return area_across(Corners{r.a, r.b, r.c});
     const double even = scale_ * SolidAngle(r.a, r.b, r.c).value();
     return lambertian() ? even * cosine(r) : even;
   }
@@ -602,7 +613,8 @@ class LightSource {
                                                                      double bar) const {
     if (kind_ == Kind::kParallelBent) {
       Corners r_bar;
-      area_normal_adjoint({r.a, r.b, r.c}, (0.5 * bar / direction_.z()) * direction_, r_bar);
+      area_normal_adjoint<double>({r.a, r.b, r.c}, (0.5 * bar / direction_.z()) * direction_,
+                                  r_bar);
       return {r_bar.v0, r_bar.v1, r_bar.v2};
     }
     const double share = lambertian() ? cosine(r) : 1.0;

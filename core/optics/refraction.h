@@ -6,16 +6,20 @@
 #include <cmath>
 
 #include "core/compute/host_device.h"
+#include "core/compute/lanes.h"
 #include "core/compute/scalar.h"
 
 namespace lensforge {
 
 // Notation: a incident and n normal unit vectors, c = n·a, η = n_inside / n_outside,
 // s = 1 + η²(c² − 1) the squared cosine of the refracted angle, b refracted direction,
-// m = (b_x, b_y)/b_z its slope. A bar (…_bar) is the derivative of a scalar by that quantity.
+// m = (b_x, b_y)/b_z its slope. A bar (…_bar) is the derivative of a scalar by that quantity. T is
+// a double, or a vector of the doubles of several rays (core/compute/lanes.h), each with the same
+// bits.
 
 /// cos² of the angle of refraction (Sun et al., Eq. 29); negative means total internal reflection.
-LF_HD inline double refracted_cosine_squared(double normal_dot_incident, double eta) {
+template <class T>
+LF_HD LF_INLINE T refracted_cosine_squared(const T& normal_dot_incident, double eta) {
   return 1.0 + eta * eta * (normal_dot_incident * normal_dot_incident - 1.0);
 }
 
@@ -49,65 +53,69 @@ LF_HD inline Eigen::Vector3d refract_adjoint_by_incident(const Eigen::Vector3d& 
 
 /// A ray after a surface of unit normal n, b = k n + η a with k = √s − ηc, and intermediate values
 /// for its adjoint. Light along +z, a = ẑ, takes fewer operations.
-struct RefractedBeam {
-  double root;       ///< √s
-  double inverse_z;  ///< 1/b_z
-  double k;
-  Eigen::Vector2d m;  ///< Slope (dx/dz, dy/dz).
+template <class T>
+struct RefractedBeamOf {
+  T root;       ///< √s
+  T inverse_z;  ///< 1/b_z
+  T k;
+  PlaneVector<T> m;  ///< Slope (dx/dz, dy/dz).
 
   /// @pre n_z > 0 and no total internal reflection.
-  LF_HD RefractedBeam(const Eigen::Vector3d& n, double eta)
-      : root(std::sqrt(refracted_cosine_squared(n.z(), eta))),
+  LF_HD LF_INLINE RefractedBeamOf(const SpaceVector<T>& n, double eta)
+      : root(root_of<T>(refracted_cosine_squared<T>(n.z(), eta))),
         inverse_z(1.0 / (root * n.z() + eta * (1.0 - n.z() * n.z()))),
         k(root - eta * n.z()),
-        m(k * inverse_z * n.x(), k * inverse_z * n.y()) {}
+        m{k * inverse_z * n.x(), k * inverse_z * n.y()} {}
 
   /// The ray b = a + k n after a mirror, k = −2c (Sun et al., Appendix D). @pre b_z > 0.
-  [[nodiscard]] LF_HD static RefractedBeam reflected(const Eigen::Vector3d& a,
-                                                     const Eigen::Vector3d& n) {
-    RefractedBeam beam;
+  [[nodiscard]] LF_HD LF_INLINE static RefractedBeamOf reflected(const SpaceVector<T>& a,
+                                                                 const SpaceVector<T>& n) {
+    RefractedBeamOf beam;
     beam.k = -2.0 * n.dot(a);
-    const Eigen::Vector3d b = beam.k * n + a;
-    beam.inverse_z = 1.0 / b.z();
-    beam.m = beam.inverse_z * b.head<2>();
+    beam.aim(beam.k * n + a);
     return beam;
   }
 
   /// @pre those of refract(), and b_z > 0.
-  LF_HD RefractedBeam(const Eigen::Vector3d& a, const Eigen::Vector3d& n, double eta)
-      : root(std::sqrt(refracted_cosine_squared(n.dot(a), eta))),
-        inverse_z(0.0),
-        k(root - eta * n.dot(a)) {
-    const Eigen::Vector3d b = k * n + eta * a;
-    inverse_z = 1.0 / b.z();
-    m = inverse_z * b.head<2>();
+  LF_HD LF_INLINE RefractedBeamOf(const SpaceVector<T>& a, const SpaceVector<T>& n, double eta)
+      : root(root_of<T>(refracted_cosine_squared<T>(n.dot(a), eta))),
+        inverse_z{},
+        k(root - eta * n.dot(a)),
+        m{T{}, T{}} {
+    aim(k * n + eta * a);
   }
 
   /// Derivative by b of a scalar whose derivative by m is m_bar.
-  [[nodiscard]] LF_HD Eigen::Vector3d direction_bar(const Eigen::Vector2d& m_bar) const {
-    return inverse_z * Eigen::Vector3d(m_bar.x(), m_bar.y(), -m.dot(m_bar));
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> direction_bar(const PlaneVector<T>& m_bar) const {
+    return inverse_z * SpaceVector<T>(m_bar.x(), m_bar.y(), -m.dot(m_bar));
   }
   /// Adjoint of n ↦ m: n_bar for a given m_bar.
-  [[nodiscard]] LF_HD Eigen::Vector3d adjoint(const Eigen::Vector3d& n, double eta,
-                                              const Eigen::Vector2d& m_bar) const {
-    const Eigen::Vector3d b_bar = direction_bar(m_bar);
-    const double k_by_nz = eta * eta * n.z() / root - eta;
-    Eigen::Vector3d n_bar = k * b_bar;
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> adjoint(const SpaceVector<T>& n, double eta,
+                                                       const PlaneVector<T>& m_bar) const {
+    const SpaceVector<T> b_bar = direction_bar(m_bar);
+    const T k_by_nz = eta * eta * n.z() / root - eta;
+    SpaceVector<T> n_bar = k * b_bar;
     n_bar.z() += n.dot(b_bar) * k_by_nz;
     return n_bar;
   }
   /// Derivative of a lens's k by c.
-  [[nodiscard]] LF_HD double k_by_cosine(double c, double eta) const {
+  [[nodiscard]] LF_HD LF_INLINE T k_by_cosine(const T& c, double eta) const {
     return eta * eta * c / root - eta;
   }
 
  private:
-  LF_HD RefractedBeam() : root(0.0), inverse_z(0.0), k(0.0), m(0.0, 0.0) {}
+  LF_HD LF_INLINE RefractedBeamOf() : root{}, inverse_z{}, k{}, m{T{}, T{}} {}
+  LF_HD LF_INLINE void aim(const SpaceVector<T>& b) {
+    inverse_z = 1.0 / b.z();
+    m = {inverse_z * b.x(), inverse_z * b.y()};
+  }
 };
+using RefractedBeam = RefractedBeamOf<double>;
 
 /// Adjoint of the mirror's b = a − 2 (n·a) n by the normal, and by the incident direction.
-LF_HD inline Eigen::Vector3d reflect_adjoint(const Eigen::Vector3d& a, const Eigen::Vector3d& n,
-                                             const Eigen::Vector3d& b_bar) {
+template <class T = double>
+LF_HD LF_INLINE SpaceVector<T> reflect_adjoint(const SpaceVector<T>& a, const SpaceVector<T>& n,
+                                               const SpaceVector<T>& b_bar) {
   return -2.0 * (n.dot(b_bar) * a + n.dot(a) * b_bar);
 }
 LF_HD inline Eigen::Vector3d reflect_adjoint_by_incident(const Eigen::Vector3d& n,
@@ -167,10 +175,14 @@ inline double ghost_share(double eta) {
 
 /// f_tir = 1/(1 + η²((n·a)² − 1)), ∞ where light is totally reflected (Sun et al., Eq. 9), as a
 /// function of c = n·a.
-LF_HD inline ValueSlope reflection_barrier(double c, double eta) {
-  const double s = refracted_cosine_squared(c, eta);
-  if (!(s > 0.0) || !(c > 0.0)) return {kInfinity, 0.0};
-  return {1.0 / s, -2.0 * eta * eta * c / (s * s)};
+template <class T>
+LF_HD LF_INLINE ValueSlopeOf<T> reflection_barrier(const T& c, double eta) {
+  const T none{};
+  const T s = refracted_cosine_squared(c, eta);
+  const MaskOf<T> leaves = (s > none) & (c > none);
+  const T value = 1.0 / s;
+  const T slope = -2.0 * eta * eta * c / (s * s);
+  return {leaves ? value : none + kInfinity, leaves ? slope : none};
 }
 
 }  // namespace lensforge

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
+#include "core/compute/lanes.h"
 #include "core/optics/optical_setup.h"
 
 namespace lensforge {
@@ -31,8 +32,9 @@ class ImagePlane {
   [[nodiscard]] LF_HD int rows() const { return static_cast<int>(rows_); }
 
   /// Millimetres on the receiving plane → pixel coordinates.
-  [[nodiscard]] LF_HD Eigen::Vector2d to_pixels(const Eigen::Vector2d& mm) const {
-    return scale_.cwiseProduct(mm) + offset_;
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE PlaneVector<T> to_pixels(const PlaneVector<T>& mm) const {
+    return {scale_.x() * mm.x() + offset_.x(), scale_.y() * mm.y() + offset_.y()};
   }
   /// Pixel coordinates → millimetres on the receiving plane.
   [[nodiscard]] LF_HD Eigen::Vector2d to_mm(const Eigen::Vector2d& pixel) const {
@@ -52,7 +54,9 @@ class ImagePlane {
 ///
 /// Notation: p a point that a ray leaves, m its slope (dx/dz, dy/dz), w = (m, 1) its direction; c
 /// the picture's centre, e_x and e_y the unit vectors of the picture's axes, n their normal, away
-/// from the lens; l = p + s w the point where the ray meets the plane, s = n·(c − p) / n·w.
+/// from the lens; l = p + s w the point where the ray meets the plane, s = n·(c − p) / n·w. T is a
+/// double, or a vector of the doubles of several rays (core/compute/lanes.h), each with the same
+/// bits.
 class Screen {
  public:
   explicit Screen(const OpticalSetup& setup)
@@ -73,38 +77,54 @@ class Screen {
   }
   /// True if a ray of this slope meets the lit side.
   [[nodiscard]] LF_HD bool faces(const Eigen::Vector2d& m) const {
-    return !turned() || normal_.dot(Eigen::Vector3d(m.x(), m.y(), 1.0)) > 0.0;
+    return !turned() || is_towards<double>(m);
+  }
+  /// The same of a turned screen.
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE MaskOf<T> is_towards(const PlaneVector<T>& m) const {
+    return in_all_lanes<T>(normal_).dot(ray_of<T>(m)) > T{};
   }
 
   /// Point where a ray meets the plane, in pixel coordinates. @pre faces(m).
-  [[nodiscard]] LF_HD Eigen::Vector2d land(const Eigen::Vector3d& p,
-                                           const Eigen::Vector2d& m) const {
+  template <class T = double>
+  [[nodiscard]] LF_HD LF_INLINE PlaneVector<T> land(const SpaceVector<T>& p,
+                                                    const PlaneVector<T>& m) const {
     if (!turned()) {
-      return plane_.to_pixels(Eigen::Vector2d(p.x(), p.y()) + (focal_length_ - p.z()) * m);
+      const T height = focal_length_ - p.z();
+      return plane_.to_pixels<T>({p.x() + height * m.x(), p.y() + height * m.y()});
     }
-    const Eigen::Vector3d w(m.x(), m.y(), 1.0);
-    const Eigen::Vector3d from = p - centre_;
-    const Eigen::Vector3d l = from - (normal_.dot(from) / normal_.dot(w)) * w;
-    return plane_.to_pixels(Eigen::Vector2d(centre_.x() + x_.dot(l), centre_.y() + y_.dot(l)));
+    const SpaceVector<T> normal = in_all_lanes<T>(normal_);
+    const SpaceVector<T> w = ray_of<T>(m);
+    const SpaceVector<T> from = p - in_all_lanes<T>(centre_);
+    const T s = normal.dot(from) / normal.dot(w);
+    const SpaceVector<T> l = from - s * w;
+    return plane_.to_pixels<T>(
+        {centre_.x() + in_all_lanes<T>(x_).dot(l), centre_.y() + in_all_lanes<T>(y_).dot(l)});
   }
   /// Adjoint of land(): adds to p_bar and m_bar for a given u_bar.
-  LF_HD void land_adjoint(const Eigen::Vector3d& p, const Eigen::Vector2d& m,
-                          const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar,
-                          Eigen::Vector2d& m_bar) const {
-    const Eigen::Vector2d mm_bar = plane_.pixels_per_mm().cwiseProduct(u_bar);
+  template <class T = double>
+  LF_HD LF_INLINE void land_adjoint(const SpaceVector<T>& p, const PlaneVector<T>& m,
+                                    const PlaneVector<T>& u_bar, SpaceVector<T>& p_bar,
+                                    PlaneVector<T>& m_bar) const {
+    const Eigen::Vector2d& scale = plane_.pixels_per_mm();
+    const PlaneVector<T> mm_bar{scale.x() * u_bar.x(), scale.y() * u_bar.y()};
     if (!turned()) {
-      p_bar += Eigen::Vector3d(mm_bar.x(), mm_bar.y(), -m.dot(mm_bar));
-      m_bar += (focal_length_ - p.z()) * mm_bar;
+      p_bar += SpaceVector<T>(mm_bar.x(), mm_bar.y(), -m.dot(mm_bar));
+      const T height = focal_length_ - p.z();
+      m_bar += height * mm_bar;
       return;
     }
-    const Eigen::Vector3d w(m.x(), m.y(), 1.0);
-    const Eigen::Vector3d l_bar = mm_bar.x() * x_ + mm_bar.y() * y_;
-    const double nw = normal_.dot(w);
-    const double s = normal_.dot(centre_ - p) / nw;
+    const SpaceVector<T> normal = in_all_lanes<T>(normal_);
+    const SpaceVector<T> w = ray_of<T>(m);
+    const SpaceVector<T> l_bar =
+        mm_bar.x() * in_all_lanes<T>(x_) + mm_bar.y() * in_all_lanes<T>(y_);
+    const T nw = normal.dot(w);
+    const T s = normal.dot(in_all_lanes<T>(centre_) - p) / nw;
     // Moving along the ray changes nothing: only the components of p and w across it count.
-    const Eigen::Vector3d across = l_bar - (l_bar.dot(w) / nw) * normal_;
+    const T along = l_bar.dot(w) / nw;
+    const SpaceVector<T> across = l_bar - along * normal;
     p_bar += across;
-    m_bar += s * Eigen::Vector2d(across.x(), across.y());
+    m_bar += s * PlaneVector<T>{across.x(), across.y()};
   }
 
   /// The point of space at pixel coordinates, mm.
@@ -115,6 +135,12 @@ class Screen {
   }
 
  private:
+  /// w
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE static SpaceVector<T> ray_of(const PlaneVector<T>& m) {
+    return {m.x(), m.y(), T{} + 1.0};
+  }
+
   ImagePlane plane_;
   Eigen::Vector3d centre_;
   Eigen::Vector3d x_;

@@ -96,11 +96,13 @@ class DesignObjectiveOn {
 
   /// Normals of the surface that the vertices sample, 3 × V in the executor's memory, to be filled
   /// in before evaluate(). @pre the model is a spline.
-  [[nodiscard]] double* normals() { return std::get<SmoothRaysOn<Exec>>(rays_).view(0).normals; }
+  [[nodiscard]] double* normals() {
+    return std::get<SplineRaysOn<Exec>>(rays_).view(0).rays.normals;
+  }
   /// Derivatives by the normals after evaluate().
   [[nodiscard]] double* normals_bar() {
     return lights_.size() > 1 ? normals_bar_.data()
-                              : std::get<SmoothRaysOn<Exec>>(rays_).view(0).normal_bar;
+                              : std::get<SplineRaysOn<Exec>>(rays_).view(0).bar.normal;
   }
 
   /// DesignObjective::movable(), in the caller's memory; with an outline as of the last
@@ -121,7 +123,7 @@ class DesignObjectiveOn {
   /// Sums of one evaluation; read only after all kernels have been launched.
   struct Sums;
 
-  // Steps that depend on the surface model; Rays is FacetRaysOn or SmoothRaysOn, views are views().
+  // Steps that depend on the surface model; Rays is one of rays_, views are views().
   template <class Rays>
   void find_unlit(const std::vector<ObjectiveView>& views, Rays& rays);
   template <class Rays>
@@ -177,7 +179,7 @@ class DesignObjectiveOn {
   Buffer<Corners> corner_bar_;
   Buffer<double> laplacian_shares_;
 
-  std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_;
+  RaysOn<Exec> rays_;
   Buffer<double> color_gradient_;  ///< Gradient of one colour of several.
   Buffer<double> normals_bar_;     ///< Sum over all colours, for splines.
 };
@@ -206,14 +208,12 @@ inline Eigen::Matrix3Xd movable_coordinates(const Eigen::Matrix3Xd& vertices,
 }
 
 template <class Exec>
-std::variant<FacetRaysOn<Exec>, SmoothRaysOn<Exec>> rays_of(SurfaceModel model,
-                                                            const SurfaceMesh& mesh,
-                                                            std::size_t colors) {
-  if (model == SurfaceModel::kFacet) {
-    return FacetRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count());
+RaysOn<Exec> rays_of(SurfaceModel model, const SurfaceMesh& mesh, std::size_t colors) {
+  if (model == SurfaceModel::kFacet) return FacetRaysOn<Exec>();
+  if (model == SurfaceModel::kSmooth) {
+    return SmoothRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count(), colors);
   }
-  return SmoothRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count(),
-                            model == SurfaceModel::kSpline, colors);
+  return SplineRaysOn<Exec>(mesh.triangle_count(), mesh.vertex_count(), colors);
 }
 
 /// A matrix's entries, column by column.
@@ -246,10 +246,10 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
     color_gradient_ = Buffer<double>(3 * vertices);
     if (options_.model == SurfaceModel::kSpline) normals_bar_ = Buffer<double>(3 * vertices);
   }
-  frames_ = Buffer<FaceFrame>(faces);
-  doubled_areas_ = Buffer<double>(faces);
   corner_bar_ = Buffer<Corners>(faces);
   if (options_.weights.smooth > 0.0) {
+    frames_ = Buffer<FaceFrame>(faces);
+    doubled_areas_ = Buffer<double>(faces);
     maps_ = Buffer<WeingartenMap>(faces);
     bends_ = Buffer<FaceBend>(faces);
     edge_weights_ = Buffer<double>(3 * faces);
@@ -300,8 +300,8 @@ ObjectiveView DesignObjectiveOn<Exec>::view(const double* vertices, std::size_t 
       .incident = find_rays(executor_, light.path, vertices, mesh_.view().vertices, light.incident),
       .mesh = mesh_.view(),
       .goal = goal_view(),
-      .scratch = {frames_.data(), doubled_areas_.data(), maps_.data(), bends_.data(),
-                  edge_weights_.data(), corner_bar_.data(),
+      .scratch = {frames_.size() > 0 ? frames_.data() : nullptr, doubled_areas_.data(),
+                  maps_.data(), bends_.data(), edge_weights_.data(), corner_bar_.data(),
                   light.face_flux.size() > 0 ? light.face_flux.data() : nullptr},
       .aperture = aperture_.view()};
 }
@@ -370,7 +370,7 @@ void DesignObjectiveOn<Exec>::relinearize(const double* vertices) {
   }
 }
 
-/// Assigns facets to unlit pixels. @pre frames are up to date.
+/// Assigns facets to unlit pixels.
 template <class Exec>
 template <class Rays>
 void DesignObjectiveOn<Exec>::find_unlit(const std::vector<ObjectiveView>& views, Rays& rays) {
@@ -395,8 +395,8 @@ void DesignObjectiveOn<Exec>::find_unlit(const std::vector<ObjectiveView>& views
   }
 }
 
-/// Updates frames and the rays' arrays; false if a barrier is infinite or a ray does not leave the
-/// surface.
+/// Measures the faces and lands the rays; false if a barrier is infinite or a ray does not leave
+/// the surface.
 template <class Exec>
 template <class Rays>
 bool DesignObjectiveOn<Exec>::allowed(const std::vector<ObjectiveView>& views, Rays& rays) {

@@ -18,36 +18,47 @@
 namespace lensforge {
 
 /// f_area(a) = ((ε2 − ε1)/(a − ε1) − 1)² for ε1 < a < ε2, 0 above, ∞ below (Sun et al., Eq. 8).
-LF_HD inline ValueSlope area_barrier(double area, const AreaBarrier& barrier) {
-  if (area >= barrier.upper) return {};
-  if (!(area > barrier.lower)) return {kInfinity, 0.0};
-  const double ratio = (barrier.upper - barrier.lower) / (area - barrier.lower);
-  return {(ratio - 1.0) * (ratio - 1.0), -2.0 * (ratio - 1.0) * ratio / (area - barrier.lower)};
+template <class T>
+LF_HD LF_INLINE ValueSlopeOf<T> area_barrier(const T& area, const AreaBarrier& barrier) {
+  const T none{};
+  const T above = area - barrier.lower;
+  const T ratio = (barrier.upper - barrier.lower) / above;
+  const T value = above > none ? (ratio - 1.0) * (ratio - 1.0) : none + kInfinity;
+  const T slope = above > none ? -2.0 * (ratio - 1.0) * ratio / above : none;
+  const MaskOf<T> large = area >= barrier.upper;
+  return {large ? none : value, large ? none : slope};
 }
 
 // Forward: surface → frames, Weingarten maps, image triangles, picture error, for one face, vertex
-// or pixel. Rays says how a face sends its light and is FacetRays or SmoothRays.
+// or pixel. Rays says how a face sends its light: FacetRays, SmoothRays or SplineRays.
 
-/// Stores the frame and area of a face, and its flux where that is costly to compute. Returns its
-/// share of E_barr, which is infinite where the surface is not allowed.
+/// Stores the frame and area of a face for the smoothness terms, and its flux where that is costly
+/// to compute. Returns its share of E_barr, which is infinite where the surface is not allowed.
 struct MeasureFace {
   ObjectiveView o;
 
   LF_HD std::array<double, 1> operator()(std::int64_t i) const {
     const Corners t = o.corners(i);
-    const FaceFrame frame = face_frame(t);
-    o.scratch.frames[i] = frame;
-    o.scratch.doubled_areas[i] = frame.n.dot(area_normal(t));  // |N|, without its root
-    const double area = plan_area(t);
+    const FaceNormal normal(t);
+    if (o.scratch.frames != nullptr) {
+      o.scratch.frames[i] = {normal.n, centroid(t)};
+      o.scratch.doubled_areas[i] = normal.doubled_area;
+    }
     const CornerRays rays = o.incident_at(i);
     if (o.scratch.flux != nullptr) o.scratch.flux[i] = o.light.flux(t, rays);
-    return {area_barrier(area, o.area).value + o.light.barrier(t, frame.n, rays)};
+    return {barrier(t, normal.n, rays)};
+  }
+  /// A face's share of E_barr.
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE T barrier(const CornersOf<T>& t, const SpaceVector<T>& n,
+                                          const CornerRays& rays = {}) const {
+    return area_barrier(plan_area(t), o.area).value + o.light.barrier(t, n, rays);
   }
 };
 
 /// Image triangles of the faces, as a source of FluxImageOn::render(): first one for every face,
 /// empty unless the whole face is inside the outline, then those of the parts inside.
-/// @pre frames and the rays' arrays are up to date.
+/// @pre the rays' arrays are up to date.
 template <class Rays>
 struct FaceLightSource {
   ObjectiveView o;
@@ -162,11 +173,18 @@ struct EncodeAdjoint {
 
 /// Derivatives by a face's corners, unit normal and area normal; at the end all are carried to the
 /// corners.
-struct FaceBar {
-  Corners corners;
-  Eigen::Vector3d n{0.0, 0.0, 0.0};  ///< Its unit normal.
-  Eigen::Vector3d area_normal{0.0, 0.0, 0.0};
+template <class T>
+struct FaceBarOf {
+  CornersOf<T> corners;
+  SpaceVector<T> n{T{}, T{}, T{}};  ///< Its unit normal.
+  SpaceVector<T> area_normal{T{}, T{}, T{}};
+
+  LF_HD LF_INLINE void carry_to_corners(const CornersOf<T>& t, const FaceNormalOf<T>& normal) {
+    area_normal += normalize_adjoint<T>(normal.n, normal.doubled_area, n);
+    area_normal_adjoint<T>(t, area_normal, corners);
+  }
 };
+using FaceBar = FaceBarOf<double>;
 
 /// Weighted derivatives of the picture terms by one image triangle, and their values.
 /// @param deposited  deposit_adjoint() of the image in parts of pixels; null if not known.
@@ -222,13 +240,29 @@ LF_HD inline GoalSums goal_adjoint(const ObjectiveView& o, std::int64_t face,
 }
 
 /// Adds the weighted derivatives of a face's barriers; returns its E_barr.
-LF_HD inline double barrier_adjoint(const ObjectiveView& o, std::int64_t face, const Corners& t,
-                                    FaceBar& bar) {
+template <class T>
+LF_HD LF_INLINE T barrier_adjoint(const ObjectiveView& o, const CornersOf<T>& t,
+                                  const SpaceVector<T>& n, FaceBarOf<T>& bar,
+                                  const CornerRays& rays = {}) {
   const double weight = o.weights.barrier;
-  const ValueSlope area = area_barrier(plan_area(t), o.area);
+  const ValueSlopeOf<T> area = area_barrier(plan_area(t), o.area);
   bar.area_normal.z() += 0.5 * weight * area.slope;
-  return area.value + o.light.barrier_adjoint(t, o.scratch.frames[face].n, weight, bar.corners,
-                                              bar.n, o.incident_at(face));
+  return area.value + o.light.barrier_adjoint(t, n, weight, bar.corners, bar.n, rays);
+}
+
+/// Adds the derivatives of the smoothness terms of a face and its neighbours. @param n  of the
+/// face.
+template <class T>
+LF_HD LF_INLINE void add_bends(const BendRing<T>& ring, const SpaceVector<T>& n,
+                               FaceBarOf<T>& bar) {
+  const FaceFrameOf<T> bend = bend_adjoint(ring);
+  bar.n += bend.n;
+  const T by_normal = 0.5 * ring.by_area;
+  bar.area_normal += by_normal * n;
+  const SpaceVector<T> third = (1.0 / 3.0) * bend.c;
+  bar.corners.v0 += third;
+  bar.corners.v1 += third;
+  bar.corners.v2 += third;
 }
 
 /// Derivatives of all terms by one face's corners.
@@ -246,37 +280,27 @@ struct PullBackFace {
   LF_HD LF_INLINE FaceSums::Packed operator()(std::int64_t i, const Ray& ray,
                                               const ImageTriangle* deposited) const {
     const Corners t = o.corners(i);
-    const FaceFrame& frame = o.scratch.frames[i];
+    const FaceNormal normal(t);
     FaceBar bar;
     FaceSums sums;
     sums.goal = rays.pull_back(o, i, t, ray, deposited, bar);
-    sums.barrier = barrier_adjoint(o, i, t, bar);
-    if (o.weights.smooth > 0.0) {
-      double area_bar = 0.0;
-      const FaceFrame bend = bend_adjoint(o, i, area_bar);
-      bar.n += bend.n;
-      bar.area_normal += 0.5 * area_bar * frame.n;
-      const Eigen::Vector3d third = (1.0 / 3.0) * bend.c;
-      bar.corners.v0 += third;
-      bar.corners.v1 += third;
-      bar.corners.v2 += third;
-    }
-    bar.area_normal += normalize_adjoint(frame.n, o.scratch.doubled_areas[i], bar.n);
-    area_normal_adjoint(t, bar.area_normal, bar.corners);
+    sums.barrier = barrier_adjoint(o, t, normal.n, bar, o.incident_at(i));
+    if (o.weights.smooth > 0.0) add_bends(bend_ring(o, i), normal.n, bar);
+    bar.carry_to_corners(t, normal);
     o.scratch.corner_bar[i] = bar.corners;
     return sums.packed();
   }
 };
 
-/// Gradient by a vertex: the sum over its corners.
+/// Gradient by a vertex: what its ray adds, and the sum over its corners.
 template <class Rays>
 struct GatherVertex {
   ObjectiveView o;
   Rays rays;
   double* gradient;
 
-  LF_HD void operator()(std::int64_t v) const {
-    Eigen::Vector3d sum = rays.vertex_bar(v);
+  LF_HD void operator()(std::int64_t v) const { add_corners(v, rays.vertex_bar(o, v)); }
+  LF_HD void add_corners(std::int64_t v, Eigen::Vector3d sum) const {
     const MeshView& mesh = o.mesh;
     for (auto c = mesh.vertex_corner_begin[v]; c < mesh.vertex_corner_begin[v + 1]; ++c) {
       const std::int32_t corner = mesh.vertex_corners[c];

@@ -210,7 +210,7 @@ using WeingartenMap = WeingartenMapOf<double>;
 
 /// Values per face that one kernel leaves for the next.
 struct FaceScratch {
-  FaceFrame* frames;
+  FaceFrame* frames;      ///< Null without smoothness terms.
   double* doubled_areas;  ///< F, mm²
   WeingartenMap* maps;
   FaceBend* bends;
@@ -239,7 +239,7 @@ struct ObjectiveView {
   [[nodiscard]] LF_HD CornerRays incident_at(std::int64_t face) const {
     return incident.at(mesh.triangle(face));
   }
-  /// LightPath::flux() of a face. @pre frames are up to date.
+  /// LightPath::flux() of a face. @pre MeasureFace was called for it.
   [[nodiscard]] LF_HD double flux(std::int64_t face) const {
     return scratch.flux != nullptr ? scratch.flux[face] : light.flux(corners(face));
   }

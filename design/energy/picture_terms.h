@@ -9,6 +9,7 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
+#include "core/compute/lanes.h"
 #include "design/energy/objective_options.h"
 #include "design/flux/flux_triangle.h"
 
@@ -86,21 +87,26 @@ auto gradient_term(const Exec& executor, const PictureError& picture, double wei
 // Terms of one image triangle.
 
 /// Vector from the nearest point of the picture rectangle [0, columns] × [0, rows] to u, pixels.
-LF_HD inline Eigen::Vector2d excess_outside(const Eigen::Vector2d& u, double columns, double rows) {
-  return u - Eigen::Vector2d(clamped(u.x(), 0.0, columns), clamped(u.y(), 0.0, rows));
+template <class T = double>
+LF_HD LF_INLINE PlaneVector<T> excess_outside(const PlaneVector<T>& u, double columns,
+                                              double rows) {
+  const T none{};
+  return {u.x() - clamped<T>(u.x(), none, none + columns),
+          u.y() - clamped<T>(u.y(), none, none + rows)};
 }
 
 /// E_bdr of one image triangle, Σ_k ‖u_k − P_I(u_k)‖² over its corners (Sun et al., Eq. 7), in
 /// square pixels. Adds weight × derivative to `bar`, returns the value.
-LF_HD inline double boundary_term(const ImageTriangle& t, double columns, double rows,
-                                  double weight, ImageTriangle& bar) {
-  const Eigen::Vector2d e0 = excess_outside(t.p0, columns, rows);
-  const Eigen::Vector2d e1 = excess_outside(t.p1, columns, rows);
-  const Eigen::Vector2d e2 = excess_outside(t.p2, columns, rows);
+template <class T = double>
+LF_HD LF_INLINE T boundary_term(const ImageTriangleOf<T>& t, double columns, double rows,
+                                double weight, ImageTriangleOf<T>& bar) {
+  const PlaneVector<T> e0 = excess_outside<T>(t.p0, columns, rows);
+  const PlaneVector<T> e1 = excess_outside<T>(t.p1, columns, rows);
+  const PlaneVector<T> e2 = excess_outside<T>(t.p2, columns, rows);
   bar.p0 += 2.0 * weight * e0;
   bar.p1 += 2.0 * weight * e1;
   bar.p2 += 2.0 * weight * e2;
-  return e0.squaredNorm() + e1.squaredNorm() + e2.squaredNorm();
+  return e0.dot(e0) + e1.dot(e1) + e2.dot(e2);
 }
 
 /// Marks a facet without an assigned pixel.

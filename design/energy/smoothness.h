@@ -9,14 +9,14 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
+#include "core/compute/lanes.h"
 #include "core/compute/scalar.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/energy/objective_view.h"
-#include "design/flux/lanes.h"
 
 namespace lensforge {
 
-// T is a double, or a vector of the doubles of several faces (smoothness_batch.cpp), each with the
+// T is a double, or a vector of the doubles of several faces (face_batch.cpp), each with the
 // same bits.
 
 /// Centroid c and unit normal n of a triangle, n_z > −1 (Sun et al., section 3.3). The same struct
@@ -27,9 +27,29 @@ struct FaceFrameOf {
   SpaceVector<T> c{T{}, T{}, T{}};
 };
 
-LF_HD inline FaceFrame face_frame(const Corners& t) {
-  const Eigen::Vector3d normal = area_normal(t);
-  return {(1.0 / normal.norm()) * normal, (1.0 / 3.0) * (t.v0 + t.v1 + t.v2)};
+/// Unit normal and twice the area of a triangle, mm².
+template <class T>
+struct FaceNormalOf {
+  SpaceVector<T> n;
+  T doubled_area;
+
+  LF_HD LF_INLINE explicit FaceNormalOf(const CornersOf<T>& t) {
+    const SpaceVector<T> normal = area_normal(t);
+    const T inverse = 1.0 / length_of<T>(normal);
+    n = inverse * normal;
+    doubled_area = n.dot(normal);  // Without waiting for the root.
+  }
+};
+using FaceNormal = FaceNormalOf<double>;
+
+template <class T>
+LF_HD LF_INLINE SpaceVector<T> centroid(const CornersOf<T>& t) {
+  return (1.0 / 3.0) * (t.v0 + t.v1 + t.v2);
+}
+
+template <class T>
+LF_HD LF_INLINE FaceFrameOf<T> face_frame(const CornersOf<T>& t) {
+  return {FaceNormalOf<T>(t).n, centroid(t)};
 }
 
 /// Two unit vectors at right angles to each other and to a normal, e2 = n × e1 (Duff et al. 2017,
@@ -333,29 +353,53 @@ struct BendFace {
   }
 };
 
-/// The same for all faces on the CPU, several at a time: smoothness_batch.cpp.
-FinishedSum<2> bend_in_batches(const Executor& executor, const char* kernel, std::int64_t count,
-                               const BendFace& bend, Lanes lanes = widest_lanes());
+/// The same for all faces on the CPU, several at a time: face_batch.cpp.
+FinishedSum<2> sum_in_lanes(const Executor& executor, const char* kernel, std::int64_t count,
+                            const BendFace& bend, Lanes lanes = widest_lanes());
 
 template <std::size_t N>
 FinishedSum<N> pending_sum(const Executor& executor, const char* kernel, std::int64_t count,
                            const BendFace& bend) {
-  return bend_in_batches(executor, kernel, count, bend);
+  return sum_in_lanes(executor, kernel, count, bend);
 }
 
-/// Derivatives of all faces' F by one face's frame and area. @pre bends are up to date.
-LF_HD inline FaceFrame bend_adjoint(const ObjectiveView& o, std::int64_t face, double& area_bar) {
+/// A face's bend and what its neighbours' bends have left for it.
+template <class T>
+struct BendRing {
+  SpaceVector<T> by_tilt;
+  T by_area;
+  SpaceVector<T> own_c[3];     ///< Own derivatives by the neighbours' c.
+  FaceFrameOf<T> by_there[3];  ///< The neighbours' derivatives by this face's frame.
+  bool inner[3] = {};
+};
+
+/// @pre bends are up to date.
+LF_HD inline BendRing<double> bend_ring(const ObjectiveView& o, std::int64_t face) {
   const FaceBend& own = o.scratch.bends[face];
-  FaceFrame bar;
-  bar.n = own.by_tilt.cast<double>();
+  BendRing<double> ring;
+  ring.by_tilt = own.by_tilt.cast<double>();
+  ring.by_area = own.by_area;
   for (int k = 0; k < 3; ++k) {
     const int j = o.mesh.neighbour(face, k);
+    ring.inner[k] = j >= 0;
     if (j < 0) continue;
     const FaceBend::ByNeighbour& there = o.scratch.bends[j].by_neighbours[o.mesh.edge_to(j, face)];
-    bar.n += there.n.cast<double>();
-    bar.c += there.c.cast<double>() - own.by_neighbours[k].c.cast<double>();
+    ring.by_there[k] = {there.n.cast<double>(), there.c.cast<double>()};
+    ring.own_c[k] = own.by_neighbours[k].c.cast<double>();
   }
-  area_bar = own.by_area;
+  return ring;
+}
+
+/// Derivatives of all faces' F by one face's frame.
+template <class T>
+LF_HD LF_INLINE FaceFrameOf<T> bend_adjoint(const BendRing<T>& ring) {
+  FaceFrameOf<T> bar;
+  bar.n = ring.by_tilt;
+  for (int k = 0; k < 3; ++k) {
+    if (!ring.inner[k]) continue;
+    bar.n += ring.by_there[k].n;
+    bar.c += ring.by_there[k].c - ring.own_c[k];
+  }
   return bar;
 }
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include "design/flux/lanes.h"
+#include "core/compute/lanes.h"
 
 namespace lensforge {
 namespace {
@@ -31,11 +31,8 @@ struct SmallBatch {
   Mask in_one;  ///< Within one pixel.
   Mask usual;   ///< Others are to be computed one by one.
 
-  LF_INLINE SmallBatch(const TriangleBatch& batch, int i, int columns, int rows)
-      : t{{load_lanes<V>(batch.x(0, i)), load_lanes<V>(batch.y(0, i))},
-          {load_lanes<V>(batch.x(1, i)), load_lanes<V>(batch.y(1, i))},
-          {load_lanes<V>(batch.x(2, i)), load_lanes<V>(batch.y(2, i))}},
-        flux(load_lanes<V>(batch.flux(i))) {
+  LF_INLINE SmallBatch(const ImageTriangleOf<V>& image, int columns, int rows)
+      : t{image.p0, image.p1, image.p2}, flux(image.flux) {
     const V x0 = least(t.a.x(), least(t.b.x(), t.c.x()));
     const V x1 = most(t.a.x(), most(t.b.x(), t.c.x()));
     const V y0 = least(t.a.y(), least(t.b.y(), t.c.y()));
@@ -75,11 +72,22 @@ struct SmallBatch {
   }
 };
 
+/// True if a comparison holds in every lane.
+template <class Mask>
+LF_INLINE bool in_every_lane(const Mask& mask) {
+  std::int64_t every = -1;
+  for (std::size_t k = 0; k < sizeof(Mask) / sizeof(std::int64_t); ++k) every &= mask[k];
+  return every != 0;
+}
+
 /// Deposits of a batch before they are added.
 struct BatchDeposits {
   alignas(64) double share[4][TriangleBatch::kSize];  ///< By quadrant, in units.
   alignas(64) double column[TriangleBatch::kSize];    ///< The last; −1 for triangles left out.
   alignas(64) double row[TriangleBatch::kSize];
+  /// True for a vector whose triangles are each within one pixel, which then have the last share
+  /// alone: the usual case where pixels have many triangles.
+  bool in_one[TriangleBatch::kSize];
 };
 
 template <int lanes>
@@ -87,10 +95,18 @@ LF_INLINE void measure_deposits(const TriangleBatch& batch, int count, int colum
                                 BatchDeposits& deposits) {
   using V = typename VectorOf<lanes>::Doubles;
   for (int i = 0; i < count; i += lanes) {
-    const SmallBatch<lanes> small(batch, i, columns, rows);
+    const SmallBatch<lanes> small(batch.several<V>(i), columns, rows);
+    const V none{};
+    store_lanes<V>(small.usual ? small.c1 : none - 1.0, &deposits.column[i]);
+    store_lanes<V>(small.r1, &deposits.row[i]);
+    const bool in_one = in_every_lane(small.in_one);
+    for (int k = 0; k < lanes; ++k) deposits.in_one[i + k] = in_one;
+    if (in_one) {
+      store_lanes<V>(small.flux * kFluxUnits, &deposits.share[3][i]);
+      continue;
+    }
     const Quadrants<V> areas = flux_detail::quadrant_areas(small.about_crossing());
     const V density = small.flux / areas.sum();
-    const V none{};
     const V above_left = density * areas.above_left;
     const V above_right = density * areas.above_right;
     const V below_left = density * areas.below_left;
@@ -99,8 +115,6 @@ LF_INLINE void measure_deposits(const TriangleBatch& batch, int count, int colum
     store_lanes<V>((small.in_one ? none : above_right) * kFluxUnits, &deposits.share[1][i]);
     store_lanes<V>((small.in_one ? none : below_left) * kFluxUnits, &deposits.share[2][i]);
     store_lanes<V>((small.in_one ? small.flux : below_right) * kFluxUnits, &deposits.share[3][i]);
-    store_lanes<V>(small.usual ? small.c1 : none - 1.0, &deposits.column[i]);
-    store_lanes<V>(small.r1, &deposits.row[i]);
   }
 }
 
@@ -110,7 +124,7 @@ LF_INLINE void measure_adjoints(const TriangleBatch& batch, int count,
                                 std::int64_t* usual) {
   using V = typename VectorOf<lanes>::Doubles;
   for (int i = 0; i < count; i += lanes) {
-    const SmallBatch<lanes> small(batch, i, cotangent.columns, cotangent.rows);
+    const SmallBatch<lanes> small(batch.several<V>(i), cotangent.columns, cotangent.rows);
     const V one = V{} + 1.0;
     const V column = small.usual ? small.c1 : one;
     const V row = small.usual ? small.r1 : one;
@@ -120,67 +134,25 @@ LF_INLINE void measure_adjoints(const TriangleBatch& batch, int count,
                  static_cast<std::int64_t>(column[k]);
     }
     constexpr auto kLanes = std::make_integer_sequence<int, lanes>();
-    const Quadrants<V> g{gather_lanes<V>(below, -1 - cotangent.columns, kLanes),
-                         gather_lanes<V>(below, -cotangent.columns, kLanes),
-                         gather_lanes<V>(below, -1, kLanes), gather_lanes<V>(below, 0, kLanes)};
-    PlaneTriangle<V> bar{};
-    const V integral = flux_detail::gather_small(small.about_crossing(), g, bar);
-    const V mean = flux_detail::mean_adjoint(small.t, small.doubled, small.flux, integral, bar);
-    const V none{};
-    store_lanes<V>(small.in_one ? none : bar.a.x(), bars.x(0, i));
-    store_lanes<V>(small.in_one ? none : bar.a.y(), bars.y(0, i));
-    store_lanes<V>(small.in_one ? none : bar.b.x(), bars.x(1, i));
-    store_lanes<V>(small.in_one ? none : bar.b.y(), bars.y(1, i));
-    store_lanes<V>(small.in_one ? none : bar.c.x(), bars.x(2, i));
-    store_lanes<V>(small.in_one ? none : bar.c.y(), bars.y(2, i));
-    store_lanes<V>(small.in_one ? g.below_right : mean, bars.flux(i));
+    const V here = gather_lanes<V>(below, 0, kLanes);
+    ImageTriangleOf<V> bar;
+    bar.flux = here;
+    if (!in_every_lane(small.in_one)) {
+      const Quadrants<V> g{gather_lanes<V>(below, -1 - cotangent.columns, kLanes),
+                           gather_lanes<V>(below, -cotangent.columns, kLanes),
+                           gather_lanes<V>(below, -1, kLanes), here};
+      PlaneTriangle<V> by{};
+      const V integral = flux_detail::gather_small(small.about_crossing(), g, by);
+      const V mean = flux_detail::mean_adjoint(small.t, small.doubled, small.flux, integral, by);
+      const V none{};
+      bar.p0 = {small.in_one ? none : by.a.x(), small.in_one ? none : by.a.y()};
+      bar.p1 = {small.in_one ? none : by.b.x(), small.in_one ? none : by.b.y()};
+      bar.p2 = {small.in_one ? none : by.c.x(), small.in_one ? none : by.c.y()};
+      bar.flux = small.in_one ? here : mean;
+    }
+    bars.set_several(i, bar);
     std::memcpy(usual + i, &small.usual, sizeof small.usual);
   }
-}
-
-// Once for any processor and once for those with AVX2, without its fused operations, which round
-// otherwise.
-
-[[gnu::flatten]] void measure_deposits_by_2(const TriangleBatch& batch, int count, int columns,
-                                            int rows, BatchDeposits& deposits) {
-  measure_deposits<2>(batch, count, columns, rows, deposits);
-}
-[[gnu::flatten]] void measure_adjoints_by_2(const TriangleBatch& batch, int count,
-                                            const FluxCotangent& cotangent, TriangleBatch& bars,
-                                            std::int64_t* usual) {
-  measure_adjoints<2>(batch, count, cotangent, bars, usual);
-}
-#if defined(__x86_64__)
-[[gnu::target("avx2"), gnu::flatten]] void measure_deposits_by_4(const TriangleBatch& batch,
-                                                                 int count, int columns, int rows,
-                                                                 BatchDeposits& deposits) {
-  measure_deposits<4>(batch, count, columns, rows, deposits);
-}
-[[gnu::target("avx2"), gnu::flatten]] void measure_adjoints_by_4(const TriangleBatch& batch,
-                                                                 int count,
-                                                                 const FluxCotangent& cotangent,
-                                                                 TriangleBatch& bars,
-                                                                 std::int64_t* usual) {
-  measure_adjoints<4>(batch, count, cotangent, bars, usual);
-}
-#endif
-
-void measure_deposits(Lanes lanes, const TriangleBatch& batch, int count,
-                      const FluxAccumulator& image, BatchDeposits& deposits) {
-#if defined(__x86_64__)
-  if (lanes == Lanes::kFour) {
-    return measure_deposits_by_4(batch, count, image.columns, image.rows, deposits);
-  }
-#endif
-  measure_deposits_by_2(batch, count, image.columns, image.rows, deposits);
-}
-
-void measure_adjoints(Lanes lanes, const TriangleBatch& batch, int count,
-                      const FluxCotangent& cotangent, TriangleBatch& bars, std::int64_t* usual) {
-#if defined(__x86_64__)
-  if (lanes == Lanes::kFour) return measure_adjoints_by_4(batch, count, cotangent, bars, usual);
-#endif
-  measure_adjoints_by_2(batch, count, cotangent, bars, usual);
 }
 
 }  // namespace
@@ -188,7 +160,9 @@ void measure_adjoints(Lanes lanes, const TriangleBatch& batch, int count,
 void deposit_batch(const TriangleBatch& triangles, int count, const FluxAccumulator& image,
                    Lanes lanes) {
   BatchDeposits deposits;
-  measure_deposits(lanes, triangles, count, image, deposits);
+  call_with_lanes(lanes, [&]<int kLanes>() {
+    return measure_deposits<kLanes>(triangles, count, image.columns, image.rows, deposits);
+  });
   for (int i = 0; i < count; ++i) {
     if (deposits.column[i] < 0.0) {
       deposit(triangles.at(i), image);
@@ -196,6 +170,12 @@ void deposit_batch(const TriangleBatch& triangles, int count, const FluxAccumula
     }
     const int left = static_cast<int>(deposits.column[i]) - 1;
     const int below = static_cast<int>(deposits.row[i]);
+    if (deposits.in_one[i]) {
+      const std::int64_t units = std::llrint(deposits.share[3][i]);
+      image.add(below, left + 1, units);
+      image.add(below, left + 2, -units);
+      continue;
+    }
     image.add_inside(below - 1, left, std::llrint(deposits.share[0][i]),
                      std::llrint(deposits.share[1][i]));
     image.add_inside(below, left, std::llrint(deposits.share[2][i]),
@@ -207,17 +187,14 @@ void deposit_adjoint_batch(const TriangleBatch& triangles, int count,
                            const FluxCotangent& cotangent, TriangleBatch& bars, Lanes lanes) {
   alignas(64) std::int64_t usual[TriangleBatch::kSize] = {};
   const bool has_two_by_two = cotangent.columns > 1 && cotangent.rows > 1;
-  if (has_two_by_two) measure_adjoints(lanes, triangles, count, cotangent, bars, usual);
+  if (has_two_by_two) {
+    call_with_lanes(lanes, [&]<int kLanes>() {
+      return measure_adjoints<kLanes>(triangles, count, cotangent, bars, usual);
+    });
+  }
   for (int i = 0; i < count; ++i) {
     if (usual[i] == 0) bars.set(i, deposit_adjoint(triangles.at(i), cotangent));
   }
-}
-
-Lanes widest_lanes() {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") != 0) return Lanes::kFour;
-#endif
-  return Lanes::kTwo;
 }
 
 }  // namespace lensforge

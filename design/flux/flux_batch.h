@@ -3,8 +3,8 @@
 
 #include <Eigen/Core>
 
+#include "core/compute/lanes.h"
 #include "design/flux/flux_triangle.h"
-#include "design/flux/lanes.h"
 
 namespace lensforge {
 
@@ -27,6 +27,26 @@ class TriangleBatch {
     return {{x_[0][i], y_[0][i]}, {x_[1][i], y_[1][i]}, {x_[2][i], y_[2][i]}, flux_[i]};
   }
 
+  /// Triangles i and following, as many as a vector has lanes.
+  template <class V>
+  [[nodiscard]] LF_INLINE ImageTriangleOf<V> several(int i) const {
+    return {{load_lanes<V>(x(0, i)), load_lanes<V>(y(0, i))},
+            {load_lanes<V>(x(1, i)), load_lanes<V>(y(1, i))},
+            {load_lanes<V>(x(2, i)), load_lanes<V>(y(2, i))},
+            load_lanes<V>(flux(i))};
+  }
+  template <class V>
+  LF_INLINE void set_several(int i, const ImageTriangleOf<V>& t) {
+    store_lanes<V>(t.p0.x(), x(0, i));
+    store_lanes<V>(t.p0.y(), y(0, i));
+    store_lanes<V>(t.p1.x(), x(1, i));
+    store_lanes<V>(t.p1.y(), y(1, i));
+    store_lanes<V>(t.p2.x(), x(2, i));
+    store_lanes<V>(t.p2.y(), y(2, i));
+    store_lanes<V>(t.flux, flux(i));
+  }
+
+ private:
   // Numbers of triangles i and following.
   [[nodiscard]] double* x(int corner, int i) { return &x_[corner][i]; }
   [[nodiscard]] double* y(int corner, int i) { return &y_[corner][i]; }
@@ -35,7 +55,6 @@ class TriangleBatch {
   [[nodiscard]] const double* y(int corner, int i) const { return &y_[corner][i]; }
   [[nodiscard]] const double* flux(int i) const { return &flux_[i]; }
 
- private:
   alignas(64) double x_[3][kSize] = {};
   alignas(64) double y_[3][kSize] = {};
   alignas(64) double flux_[kSize] = {};

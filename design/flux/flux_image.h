@@ -36,6 +36,12 @@ struct DepositFlux {
   }
 };
 
+/// Triangles i … i + count − 1 of a source. Sources that make several at a time overload it.
+template <class Source>
+void fill_batch(const Source& source, std::int64_t i, int count, TriangleBatch& batch) {
+  for (int k = 0; k < count; ++k) batch.set(k, source(i + k));
+}
+
 /// The same on the CPU, several triangles at a time.
 template <class Source>
 void parallel_for_worker(const Executor& executor, const char* kernel, std::int64_t count,
@@ -49,7 +55,7 @@ void parallel_for_worker(const Executor& executor, const char* kernel, std::int6
         TriangleBatch batch;
         for (std::int64_t i = begin; i < end; i += TriangleBatch::kSize) {
           const int size = static_cast<int>(std::min<std::int64_t>(TriangleBatch::kSize, end - i));
-          for (int k = 0; k < size; ++k) batch.set(k, d.source(i + k));
+          fill_batch(d.source, i, size, batch);
           deposit_batch(batch, size, image);
         }
       },

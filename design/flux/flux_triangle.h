@@ -6,22 +6,26 @@
 #include <cstdint>
 
 #include "core/compute/host_device.h"
-#include "design/flux/lanes.h"
+#include "core/compute/lanes.h"
 
 namespace lensforge {
 
 /// Image of one surface triangle on the receiving plane: a triangle of uniform irradiance. The same
-/// struct holds derivatives of a scalar with respect to these numbers.
-struct ImageTriangle {
-  Eigen::Vector2d p0{0.0, 0.0};  ///< Corners in pixel coordinates (core/optics/image_plane.h).
-  Eigen::Vector2d p1{0.0, 0.0};
-  Eigen::Vector2d p2{0.0, 0.0};
-  double flux = 0.0;  ///< Share of the lens's total flux.
+/// struct holds derivatives of a scalar with respect to these numbers. T is a double, or a vector
+/// of the doubles of several triangles (core/compute/lanes.h), each with the same bits.
+template <class T>
+struct ImageTriangleOf {
+  PlaneVector<T> p0{T{}, T{}};  ///< Corners in pixel coordinates (ImagePlane).
+  PlaneVector<T> p1{T{}, T{}};
+  PlaneVector<T> p2{T{}, T{}};
+  T flux{};  ///< Share of the lens's total flux.
 };
+using ImageTriangle = ImageTriangleOf<double>;
 
 /// The same light in a picture with `scale` times as many pixels each way. For derivatives this is
 /// the adjoint.
-LF_HD inline ImageTriangle magnified(const ImageTriangle& t, double scale) {
+template <class T>
+LF_HD LF_INLINE ImageTriangleOf<T> magnified(const ImageTriangleOf<T>& t, double scale) {
   return {scale * t.p0, scale * t.p1, scale * t.p2, t.flux};
 }
 

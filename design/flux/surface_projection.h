@@ -22,10 +22,11 @@ namespace lensforge {
 ///
 /// @param beam  light that leaves the facet, LightPath::facet_beam().
 /// @param flux  share of the light that the facet takes in (Eq. 1), LightPath::flux().
-LF_HD inline ImageTriangle land_facet(const Corners& t, const FacetBeam& beam,
-                                      const LightPath& light, double flux) {
-  return {light.land(t.v0, beam.slope(0)), light.land(t.v1, beam.slope(1)),
-          light.land(t.v2, beam.slope(2)), flux};
+template <class T>
+LF_HD LF_INLINE ImageTriangleOf<T> land_facet(const CornersOf<T>& t, const FacetBeamOf<T>& beam,
+                                              const LightPath& light, const T& flux) {
+  return {light.land<T>(t.v0, beam.slope(0)), light.land<T>(t.v1, beam.slope(1)),
+          light.land<T>(t.v2, beam.slope(2)), flux};
 }
 LF_HD inline ImageTriangle project_facet(const Corners& t, const FacetBeam& beam,
                                          const LightPath& light) {
@@ -34,45 +35,53 @@ LF_HD inline ImageTriangle project_facet(const Corners& t, const FacetBeam& beam
 
 /// Adjoint of project_facet() without the flux: adds to the corners' derivatives and returns n_bar,
 /// the derivative by the unit normal.
-LF_HD inline Eigen::Vector3d project_facet_adjoint(const Corners& t, const Eigen::Vector3d& n,
-                                                   const FacetBeam& beam, const LightPath& light,
-                                                   const ImageTriangle& bar, Corners& grad) {
-  FacetSlopes m_bar;
-  light.land_adjoint(t.v0, beam.slope(0), bar.p0, grad.v0, m_bar.m0);
-  light.land_adjoint(t.v1, beam.slope(1), bar.p1, grad.v1, m_bar.m1);
-  light.land_adjoint(t.v2, beam.slope(2), bar.p2, grad.v2, m_bar.m2);
-  return light.facet_beam_adjoint(t, n, beam, m_bar, grad);
+template <class T>
+LF_HD LF_INLINE SpaceVector<T> project_facet_adjoint(const CornersOf<T>& t, const SpaceVector<T>& n,
+                                                     const FacetBeamOf<T>& beam,
+                                                     const LightPath& light,
+                                                     const ImageTriangleOf<T>& bar,
+                                                     CornersOf<T>& grad) {
+  FacetSlopesOf<T> m_bar;
+  light.land_adjoint<T>(t.v0, beam.slope(0), bar.p0, grad.v0, m_bar.m0);
+  light.land_adjoint<T>(t.v1, beam.slope(1), bar.p1, grad.v1, m_bar.m1);
+  light.land_adjoint<T>(t.v2, beam.slope(2), bar.p2, grad.v2, m_bar.m2);
+  return light.facet_beam_adjoint<T>(t, n, beam, m_bar, grad);
 }
 
 // Smooth model: one ray per vertex, refracted at the vertex normal; image triangles share corners
 // and stretch. A milled and polished part is like this.
 
 /// Normal of a vertex: the sum of the area normals around it, normalised (area weighting).
-struct VertexNormal {
-  Eigen::Vector3d n;
-  double length;  ///< |sum of area normals|, mm²·2
+template <class T>
+struct VertexNormalOf {
+  SpaceVector<T> n;
+  T length;  ///< |sum of area normals|, mm²·2
 
-  LF_HD explicit VertexNormal(const Eigen::Vector3d& area_normal_sum)
-      : n(area_normal_sum), length(area_normal_sum.norm()) {
-    n *= 1.0 / length;
+  LF_HD LF_INLINE explicit VertexNormalOf(const SpaceVector<T>& area_normal_sum)
+      : length(length_of<T>(area_normal_sum)) {
+    const T inverse = 1.0 / length;
+    n = inverse * area_normal_sum;
   }
 };
+using VertexNormal = VertexNormalOf<double>;
 
 /// Landing point of a vertex's ray, in pixel coordinates. @pre n transmits.
-LF_HD inline Eigen::Vector2d project_vertex(const Eigen::Vector3d& p, const Eigen::Vector3d& n,
-                                            const LightPath& light,
-                                            const IncidentRay* known = nullptr) {
-  return light.land(p, light.beam(p, n, known).m);
+template <class T = double>
+LF_HD LF_INLINE PlaneVector<T> project_vertex(const SpaceVector<T>& p, const SpaceVector<T>& n,
+                                              const LightPath& light,
+                                              const IncidentRay* known = nullptr) {
+  return light.land<T>(p, light.beam<T>(p, n, known).m);
 }
 
 /// Adjoint of project_vertex(): adds to p_bar, returns n_bar.
-LF_HD inline Eigen::Vector3d project_vertex_adjoint(
-    const Eigen::Vector3d& p, const Eigen::Vector3d& n, const LightPath& light,
-    const Eigen::Vector2d& u_bar, Eigen::Vector3d& p_bar, const IncidentRay* known = nullptr) {
-  const RefractedBeam beam = light.beam(p, n, known);
-  Eigen::Vector2d m_bar(0.0, 0.0);
-  light.land_adjoint(p, beam.m, u_bar, p_bar, m_bar);
-  return light.beam_adjoint(p, n, beam, m_bar, p_bar, known);
+template <class T = double>
+LF_HD LF_INLINE SpaceVector<T> project_vertex_adjoint(
+    const SpaceVector<T>& p, const SpaceVector<T>& n, const LightPath& light,
+    const PlaneVector<T>& u_bar, SpaceVector<T>& p_bar, const IncidentRay* known = nullptr) {
+  const RefractedBeamOf<T> beam = light.beam<T>(p, n, known);
+  PlaneVector<T> m_bar{T{}, T{}};
+  light.land_adjoint<T>(p, beam.m, u_bar, p_bar, m_bar);
+  return light.beam_adjoint<T>(p, n, beam, m_bar, p_bar, known);
 }
 
 // Faces that an outline cuts.

@@ -245,4 +245,36 @@ AxisBasis made_basis(const AxisLength& along, const std::vector<double>& points,
   return made_bases(along, points, made).front();
 }
 
+namespace {
+
+template <class Kernel>
+void call_along_rows(const Executor& executor, const char* name, std::int64_t count,
+                     const Kernel& kernel, Lanes lanes) {
+  const std::int64_t columns = kernel.s.nodes_u;
+  const auto call_row = [&](std::int64_t row) {
+    call_with_lanes(lanes, [&]<int kLanes>() {
+      const std::int64_t end = (row + 1) * columns;
+      std::int64_t i = row * columns;
+      for (; i + kLanes <= end; i += kLanes) {
+        kernel.template call<typename VectorOf<kLanes>::Doubles>(i);
+      }
+      for (; i < end; ++i) kernel(i);
+    });
+  };
+  parallel_for(executor, name, count / columns, call_row,
+               std::max<std::int64_t>(1, kDefaultGrain / columns));
+}
+
+}  // namespace
+
+void call_in_lanes(const Executor& executor, const char* kernel, std::int64_t count,
+                   const LookAcrossRows& look, Lanes lanes) {
+  call_along_rows(executor, kernel, count, look, lanes);
+}
+
+void call_in_lanes(const Executor& executor, const char* kernel, std::int64_t count,
+                   const GatherAcrossRows& gather, Lanes lanes) {
+  call_along_rows(executor, kernel, count, gather, lanes);
+}
+
 }  // namespace lensforge

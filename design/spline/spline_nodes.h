@@ -11,6 +11,7 @@
 
 #include "core/compute/executor.h"
 #include "core/compute/host_device.h"
+#include "core/compute/lanes.h"
 #include "core/mesh/surface_mesh.h"
 #include "design/flux/columns.h"
 #include "design/spline/made_by.h"
@@ -82,12 +83,17 @@ struct AxisTaps {
   const int* begin;    ///< Per coefficient: its first node, and one past its last.
   const int* end;
 
-  /// Weights of a coefficient in x, y and z of a node, and in their derivatives.
-  [[nodiscard]] LF_HD Eigen::Vector3d values(std::int64_t tap) const {
-    return {plan_value[tap], plan_value[tap], value[tap]};
+  /// A coefficient's, or several nodes' coefficients', shares of x, y and z of a node, and of their
+  /// derivatives.
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> valued(std::int64_t tap,
+                                                      const SpaceVector<T>& c) const {
+    return {plan_value[tap] * c.x(), plan_value[tap] * c.y(), value[tap] * c.z()};
   }
-  [[nodiscard]] LF_HD Eigen::Vector3d slopes(std::int64_t tap) const {
-    return {plan_slope[tap], plan_slope[tap], slope[tap]};
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> sloped(std::int64_t tap,
+                                                      const SpaceVector<T>& c) const {
+    return {plan_slope[tap] * c.x(), plan_slope[tap] * c.y(), slope[tap] * c.z()};
   }
 };
 
@@ -143,16 +149,35 @@ class AxisTapsOn {
   Buffer<int> end_;
 };
 
-/// Arguments of the kernels; tables are stored row by row, x y z of each entry in turn.
+/// A table of vectors, row by row: x of all, then y, then z, so that several are read at once.
+struct VectorTable {
+  double* numbers;
+  std::int64_t size;  ///< Number of vectors.
+
+  /// Vectors i and following, as many as T has doubles.
+  template <class T>
+  [[nodiscard]] LF_HD LF_INLINE SpaceVector<T> at(std::int64_t i) const {
+    return {load_lanes<T>(numbers + i), load_lanes<T>(numbers + size + i),
+            load_lanes<T>(numbers + 2 * size + i)};
+  }
+  template <class T>
+  LF_HD LF_INLINE void set(std::int64_t i, const SpaceVector<T>& v) const {
+    store_lanes<T>(v.x(), numbers + i);
+    store_lanes<T>(v.y(), numbers + size + i);
+    store_lanes<T>(v.z(), numbers + 2 * size + i);
+  }
+};
+
+/// Arguments of the kernels.
 struct SplineNodesView {
   AxisTaps u;
   AxisTaps v;
   std::int64_t columns;  ///< Columns of control points.
   std::int64_t nodes_u;
-  double* along;  ///< nodes_u × rows of control points: a, and in an adjoint its bar.
-  double* steep;  ///< The same of a'.
-  double* by_u;   ///< 3 × nodes: p_u
-  double* by_v;   ///< 3 × nodes: p_v
+  VectorTable along;  ///< nodes_u × rows of control points: a, and in an adjoint its bar.
+  VectorTable steep;  ///< The same of a'.
+  VectorTable by_u;   ///< Of all nodes: p_u
+  VectorTable by_v;   ///< Of all nodes: p_v
 };
 
 /// a and a' of one node column and one row of control points.
@@ -166,68 +191,71 @@ struct LookAlongRow {
     Eigen::Vector3d a(0.0, 0.0, 0.0);
     Eigen::Vector3d steep(0.0, 0.0, 0.0);
     for (int k = 0; k < s.u.taps; ++k) {
-      const auto c = column3(points, at + k);
-      a += s.u.values(s.u.taps * node + k).cwiseProduct(c);
-      steep += s.u.slopes(s.u.taps * node + k).cwiseProduct(c);
+      const Eigen::Vector3d c = column3(points, at + k);
+      a += s.u.valued<double>(s.u.taps * node + k, c);
+      steep += s.u.sloped<double>(s.u.taps * node + k, c);
     }
-    column3(s.along, i) = a;
-    column3(s.steep, i) = steep;
+    s.along.set<double>(i, a);
+    s.steep.set<double>(i, steep);
   }
 };
 
-/// Computes one node and its normal.
+/// Computes one node, or several of a row, and their normals.
 struct LookAcrossRows {
   SplineNodesView s;
   double* positions;
   double* normals;
 
-  LF_HD void operator()(std::int64_t i) const {
+  LF_HD void operator()(std::int64_t i) const { call<double>(i); }
+  template <class T>
+  LF_HD LF_INLINE void call(std::int64_t i) const {
     const std::int64_t node = i / s.nodes_u;
-    const std::int64_t at = s.v.first[node] * s.nodes_u + i % s.nodes_u;
-    Eigen::Vector3d p(0.0, 0.0, 0.0);
-    Eigen::Vector3d p_u(0.0, 0.0, 0.0);
-    Eigen::Vector3d p_v(0.0, 0.0, 0.0);
+    const std::int64_t column = i % s.nodes_u;
+    const std::int64_t at = s.v.first[node] * s.nodes_u + column;
+    SpaceVector<T> p{T{}, T{}, T{}};
+    SpaceVector<T> p_u{T{}, T{}, T{}};
+    SpaceVector<T> p_v{T{}, T{}, T{}};
     for (int k = 0; k < s.v.taps; ++k) {
       const std::int64_t tap = s.v.taps * node + k;
-      const auto a = column3(s.along, at + k * s.nodes_u);
-      p += s.v.values(tap).cwiseProduct(a);
-      p_v += s.v.slopes(tap).cwiseProduct(a);
-      p_u += s.v.values(tap).cwiseProduct(column3(s.steep, at + k * s.nodes_u));
+      const SpaceVector<T> a = s.along.at<T>(at + k * s.nodes_u);
+      p += s.v.valued<T>(tap, a);
+      p_v += s.v.sloped<T>(tap, a);
+      p_u += s.v.valued<T>(tap, s.steep.at<T>(at + k * s.nodes_u));
     }
-    const std::int64_t column = i % s.nodes_u;
-    p.z() += s.u.lift[column] + s.v.lift[node];
-    p_u.z() += s.u.tilt[column];
+    p.z() += load_lanes<T>(s.u.lift + column) + s.v.lift[node];
+    p_u.z() += load_lanes<T>(s.u.tilt + column);
     p_v.z() += s.v.tilt[node];
-    column3(positions, i) = p;
-    column3(s.by_u, i) = p_u;
-    column3(s.by_v, i) = p_v;
-    column3(normals, i) = p_u.cross(p_v);
+    set_columns3<T>(positions, i, p);
+    s.by_u.set<T>(i, p_u);
+    s.by_v.set<T>(i, p_v);
+    set_columns3<T>(normals, i, p_u.cross(p_v));
   }
 };
 
-/// Computes the bars of a and a' for one node column and one row of control points. They follow
-/// from n̄ · dn = dp_u · (p_v × n̄) + dp_v · (n̄ × p_u).
+/// Computes the bars of a and a' for one node column, or several, and one row of control points.
+/// They follow from n̄ · dn = dp_u · (p_v × n̄) + dp_v · (n̄ × p_u).
 struct GatherAcrossRows {
   SplineNodesView s;
   const double* position_bar;
   const double* normal_bar;
 
-  LF_HD void operator()(std::int64_t i) const {
+  LF_HD void operator()(std::int64_t i) const { call<double>(i); }
+  template <class T>
+  LF_HD LF_INLINE void call(std::int64_t i) const {
     const std::int64_t row = i / s.nodes_u;
-    Eigen::Vector3d a_bar(0.0, 0.0, 0.0);
-    Eigen::Vector3d steep_bar(0.0, 0.0, 0.0);
+    SpaceVector<T> a_bar{T{}, T{}, T{}};
+    SpaceVector<T> steep_bar{T{}, T{}, T{}};
     for (std::int64_t node = s.v.begin[row]; node < s.v.end[row]; ++node) {
       const std::int64_t tap = s.v.taps * node + row - s.v.first[node];
       const std::int64_t at = node * s.nodes_u + i % s.nodes_u;
-      const Eigen::Vector3d n_bar = column3(normal_bar, at);
-      const Eigen::Vector3d u_bar = column3(s.by_v, at).cross(n_bar);
-      const Eigen::Vector3d v_bar = n_bar.cross(column3(s.by_u, at));
-      a_bar += s.v.values(tap).cwiseProduct(column3(position_bar, at)) +
-               s.v.slopes(tap).cwiseProduct(v_bar);
-      steep_bar += s.v.values(tap).cwiseProduct(u_bar);
+      const SpaceVector<T> n_bar = columns3<T>(normal_bar, at);
+      const SpaceVector<T> u_bar = s.by_v.at<T>(at).cross(n_bar);
+      const SpaceVector<T> v_bar = n_bar.cross(s.by_u.at<T>(at));
+      a_bar += s.v.valued<T>(tap, columns3<T>(position_bar, at)) + s.v.sloped<T>(tap, v_bar);
+      steep_bar += s.v.valued<T>(tap, u_bar);
     }
-    column3(s.along, i) = a_bar;
-    column3(s.steep, i) = steep_bar;
+    s.along.set<T>(i, a_bar);
+    s.steep.set<T>(i, steep_bar);
   }
 };
 
@@ -243,12 +271,27 @@ struct GatherAlongRow {
     for (std::int64_t node = s.u.begin[column]; node < s.u.end[column]; ++node) {
       const std::int64_t tap = s.u.taps * node + column - s.u.first[node];
       const std::int64_t at = row * s.nodes_u + node;
-      c_bar += s.u.values(tap).cwiseProduct(column3(s.along, at)) +
-               s.u.slopes(tap).cwiseProduct(column3(s.steep, at));
+      c_bar += s.u.valued<double>(tap, s.along.at<double>(at)) +
+               s.u.sloped<double>(tap, s.steep.at<double>(at));
     }
     column3(points_bar, i) = c_bar;
   }
 };
+
+/// Kernels on the CPU, for several nodes of a row at a time, to the bits of single ones.
+void call_in_lanes(const Executor& executor, const char* kernel, std::int64_t count,
+                   const LookAcrossRows& look, Lanes lanes = widest_lanes());
+void call_in_lanes(const Executor& executor, const char* kernel, std::int64_t count,
+                   const GatherAcrossRows& gather, Lanes lanes = widest_lanes());
+
+inline void parallel_for(const Executor& executor, const char* kernel, std::int64_t count,
+                         const LookAcrossRows& look) {
+  call_in_lanes(executor, kernel, count, look);
+}
+inline void parallel_for(const Executor& executor, const char* kernel, std::int64_t count,
+                         const GatherAcrossRows& gather) {
+  call_in_lanes(executor, kernel, count, gather);
+}
 
 /// Nodes of a net of control points, and their adjoint.
 template <class Exec>
@@ -288,8 +331,15 @@ class SplineNodesOn {
   }
   [[nodiscard]] std::int64_t node_count() const { return std::int64_t{u_.nodes()} * v_.nodes(); }
   [[nodiscard]] SplineNodesView view() {
-    return {u_.view(),     v_.view(),     u_.coefficients(), u_.nodes(),
-            along_.data(), steep_.data(), by_u_.data(),      by_v_.data()};
+    const std::int64_t nodes = node_count();
+    return {u_.view(),
+            v_.view(),
+            u_.coefficients(),
+            u_.nodes(),
+            {along_.data(), table_size()},
+            {steep_.data(), table_size()},
+            {by_u_.data(), nodes},
+            {by_v_.data(), nodes}};
   }
 
   Exec executor_;
