@@ -188,15 +188,17 @@ LF_HD LF_INLINE SpaceVector<T> in_all_lanes(const Eigen::Vector3d& v) {
   return {v.x() - T{}, v.y() - T{}, v.z() - T{}};
 }
 
+template <class T, std::size_t... k>
+LF_HD LF_INLINE T root_of_lanes(const T& x, std::index_sequence<k...> /*lanes*/) {
+  return T{std::sqrt(x[k])...};
+}
 /// √x of every lane.
 template <class T>
 LF_HD LF_INLINE T root_of(const T& x) {
   if constexpr (std::is_same_v<T, double>) {
     return std::sqrt(x);
   } else {
-    T root{};
-    for (std::size_t k = 0; k < sizeof(T) / sizeof(double); ++k) root[k] = std::sqrt(x[k]);
-    return root;
+    return root_of_lanes(x, std::make_index_sequence<sizeof(T) / sizeof(double)>());
   }
 }
 /// Length of a vector.

@@ -30,12 +30,19 @@ namespace lensforge {
 /// for each corner.
 template <class T>
 struct FacetBeamOf {
-  RefractedBeamOf<T> b0;
-  RefractedBeamOf<T> b1;
-  RefractedBeamOf<T> b2;
+  RefractedBeamOf<T> b0;  ///< Several facets at a time are in parallel light.
   CornerRays known;
 
-  [[nodiscard]] LF_HD LF_INLINE const PlaneVector<T>& slope(int corner) const {
+  [[nodiscard]] LF_INLINE const PlaneVector<T>& slope(int /*corner*/) const { return b0.m; }
+};
+template <>
+struct FacetBeamOf<double> {
+  RefractedBeam b0;
+  RefractedBeam b1;
+  RefractedBeam b2;
+  CornerRays known;
+
+  [[nodiscard]] LF_HD LF_INLINE const Eigen::Vector2d& slope(int corner) const {
     return corner == 0 ? b0.m : (corner == 1 ? b1.m : b2.m);
   }
 };
@@ -184,8 +191,12 @@ class LightPath {
                                                           const SpaceVector<T>& n,
                                                           const CornerRays& known = {}) const {
     const RefractedBeamOf<T> first = beam<T>(t.v0, n, known.r0);
-    if (!source_.varies()) return {first, first, first, known};
-    return {first, beam<T>(t.v1, n, known.r1), beam<T>(t.v2, n, known.r2), known};
+    if constexpr (std::is_same_v<T, double>) {
+      if (!source_.varies()) return {first, first, first, known};
+      return {first, beam(t.v1, n, known.r1), beam(t.v2, n, known.r2), known};
+    } else {
+      return {first, known};
+    }
   }
   /// Adjoint of (t, n) ↦ the slopes at the three corners: adds to t_bar, returns n_bar.
   template <class T = double>
@@ -194,14 +205,16 @@ class LightPath {
                                                                   const FacetBeamOf<T>& facet,
                                                                   const FacetSlopesOf<T>& m_bar,
                                                                   CornersOf<T>& t_bar) const {
-    if (!source_.varies()) {
-      const PlaneVector<T> sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
-      return beam_adjoint<T>(t.v0, n, facet.b0, sum, t_bar.v0);
+    if constexpr (std::is_same_v<T, double>) {
+      if (source_.varies()) {
+        const CornerRays& rays = facet.known;
+        return beam_adjoint(t.v0, n, facet.b0, m_bar.m0, t_bar.v0, rays.r0) +
+               beam_adjoint(t.v1, n, facet.b1, m_bar.m1, t_bar.v1, rays.r1) +
+               beam_adjoint(t.v2, n, facet.b2, m_bar.m2, t_bar.v2, rays.r2);
+      }
     }
-    const CornerRays& rays = facet.known;
-    return beam_adjoint<T>(t.v0, n, facet.b0, m_bar.m0, t_bar.v0, rays.r0) +
-           beam_adjoint<T>(t.v1, n, facet.b1, m_bar.m1, t_bar.v1, rays.r1) +
-           beam_adjoint<T>(t.v2, n, facet.b2, m_bar.m2, t_bar.v2, rays.r2);
+    const PlaneVector<T> sum = m_bar.m0 + m_bar.m1 + m_bar.m2;
+    return beam_adjoint<T>(t.v0, n, facet.b0, sum, t_bar.v0);
   }
 
   /// Point where a ray of slope m from p meets the screen, in pixel coordinates.

@@ -248,6 +248,15 @@ LF_INLINE BendRing<typename VectorOf<lanes>::Doubles> gather_bends(const Objecti
   return ring;
 }
 
+/// Unit normals of faces i and following. @pre frames are up to date.
+template <int lanes>
+LF_INLINE LanesInSpace<typename VectorOf<lanes>::Doubles> gather_normals(const ObjectiveView& o,
+                                                                         std::int64_t i) {
+  const double* places[lanes];
+  for (int k = 0; k < lanes; ++k) places[k] = o.scratch.frames[i + k].n.data();
+  return gather_vector<lanes>(places, 0);
+}
+
 /// Faces i and following. @pre LightPath::takes_lanes().
 template <int lanes>
 struct SeveralFaces {
@@ -258,6 +267,9 @@ struct SeveralFaces {
 
   LF_INLINE SeveralFaces(const ObjectiveView& o, std::int64_t i)
       : t(gather_corners<lanes>(o.mesh, o.vertices, i)), normal(t) {}
+  LF_INLINE SeveralFaces(const ObjectiveView& o, std::int64_t i, const LanesInSpace<V>& unit_normal)
+      : t(gather_corners<lanes>(o.mesh, o.vertices, i)),
+        normal(unit_normal, load_lanes<V>(o.scratch.doubled_areas + i)) {}
 
   /// Carries derivatives to the corners, with those of the terms that depend on the surface alone;
   /// adds the faces' shares of E_barr in order.
@@ -283,8 +295,9 @@ struct SeveralImages<lanes, FacetRays> : SeveralFaces<lanes> {
   FacetBeamOf<V> beam;
   ImageTriangleOf<V> image;
 
+  /// Reading normals takes less time than computing them again.
   LF_INLINE SeveralImages(const ObjectiveView& o, const FacetRays& /*rays*/, std::int64_t i)
-      : SeveralFaces<lanes>(o, i),
+      : SeveralFaces<lanes>(o, i, gather_normals<lanes>(o, i)),
         beam(o.light.facet_beam(this->t, this->normal.n)),
         image(land_facet(this->t, beam, o.light, o.light.flux(this->t))) {}
 

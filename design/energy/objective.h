@@ -247,9 +247,11 @@ DesignObjectiveOn<Exec>::DesignObjectiveOn(const SurfaceMesh& mesh, const Optica
     if (options_.model == SurfaceModel::kSpline) normals_bar_ = Buffer<double>(3 * vertices);
   }
   corner_bar_ = Buffer<Corners>(faces);
-  if (options_.weights.smooth > 0.0) {
+  if (options_.weights.smooth > 0.0 || options_.model == SurfaceModel::kFacet) {
     frames_ = Buffer<FaceFrame>(faces);
     doubled_areas_ = Buffer<double>(faces);
+  }
+  if (options_.weights.smooth > 0.0) {
     maps_ = Buffer<WeingartenMap>(faces);
     bends_ = Buffer<FaceBend>(faces);
     edge_weights_ = Buffer<double>(3 * faces);

@@ -210,7 +210,7 @@ using WeingartenMap = WeingartenMapOf<double>;
 
 /// Values per face that one kernel leaves for the next.
 struct FaceScratch {
-  FaceFrame* frames;      ///< Null without smoothness terms.
+  FaceFrame* frames;      ///< Null without smoothness terms, but for facets.
   double* doubled_areas;  ///< F, mm²
   WeingartenMap* maps;
   FaceBend* bends;

@@ -33,6 +33,8 @@ struct FaceNormalOf {
   SpaceVector<T> n;
   T doubled_area;
 
+  LF_HD LF_INLINE FaceNormalOf(const SpaceVector<T>& unit, const T& area)
+      : n(unit), doubled_area(area) {}
   LF_HD LF_INLINE explicit FaceNormalOf(const CornersOf<T>& t) {
     const SpaceVector<T> normal = area_normal(t);
     const T inverse = 1.0 / length_of<T>(normal);

@@ -396,8 +396,7 @@ TEST(BendFace, SeveralAtATimeHaveTheBitsOfSingleFaces) {
   const std::vector<FaceBend> expected = bends;
   for (const Lanes lanes : {Lanes::kTwo, widest_lanes()}) {
     for (FaceBend& each : bends) each.by_area = -1.0F;
-    EXPECT_EQ(sum_in_lanes(executor, "bend faces", mesh.triangle_count(), bend, lanes).get(),
-              sum);
+    EXPECT_EQ(sum_in_lanes(executor, "bend faces", mesh.triangle_count(), bend, lanes).get(), sum);
     for (std::size_t i = 0; i < faces; ++i) {
       ASSERT_EQ(bends[i].by_area, expected[i].by_area);
       ASSERT_EQ(bends[i].by_tilt, expected[i].by_tilt);
