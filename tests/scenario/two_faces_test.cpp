@@ -126,9 +126,10 @@ TEST_F(TwoFaces, ShareTheSlopesOfOnePicture) {
   const auto& front = std::get<HeightFront>(lens.setup.front.value()).spline->grid().heights;
   EXPECT_EQ(*std::max_element(front.begin(), front.end()), 0.0F);
   EXPECT_NEAR(*std::min_element(front.begin(), front.end()), -relief[1], 0.5 * relief[1]);
-  for (const std::string how : {"spline", "forward"}) {
+  // From the front no light enters beyond the lens's edges.
+  for (const auto& [how, within] : {std::pair("spline", 1e-3), std::pair("forward", 4e-3)}) {
     EXPECT_NEAR(tracer_finds(path("two"), how)["mae"].get<double>(),
-                lens.metrics.at(SurfaceModel::kSpline).mae, 1e-3)
+                lens.metrics.at(SurfaceModel::kSpline).mae, within)
         << how;
   }
 }
