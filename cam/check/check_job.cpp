@@ -34,46 +34,6 @@ constexpr double kSeenPerPixel = 1.5;
 constexpr int kFine = 5;
 constexpr double kCompared = 1.2;  ///< Of the wall that is compared.
 
-/// Pixel coordinates at which a photograph shows a place on the wall: Newton's steps.
-class WallToPhoto {
- public:
-  WallToPhoto(const Photograph& photo, Eigen::VectorXd view)
-      : half_(0.5 * Eigen::Vector2d(photo.light.columns(), photo.light.rows())),
-        view_(std::move(view)) {}
-
-  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& wall) {
-    constexpr double kStep = 1e-5;
-    constexpr int kSteps = 12;
-    constexpr double kLongest = 0.5;  // Half diagonals of the photograph.
-    constexpr double kFarthest = 2.0;
-    for (int k = 0; k < kSteps; ++k) {
-      const Eigen::Vector2d off = wall_of(view_, last_) - wall;
-      Eigen::Matrix2d slope;
-      for (int axis = 0; axis < 2; ++axis) {
-        const Eigen::Vector2d moved = last_ + kStep * Eigen::Vector2d::Unit(axis);
-        slope.col(axis) = (wall_of(view_, moved) - wall - off) / kStep;
-      }
-      const Eigen::Vector2d step = slope.partialPivLu().solve(off);
-      if (!step.allFinite()) break;
-      last_ -= step * std::min(1.0, kLongest / step.norm());
-      if (step.norm() < 1e-9) break;
-    }
-    // Beyond what a strong distortion shows there is no such place: the next one begins anew.
-    if (last_.norm() > kFarthest) last_.setZero();
-    return half_ + last_ * half_.norm();
-  }
-
-  /// Light of the wall's picture from that of the photograph at pixel coordinates.
-  [[nodiscard]] double light(const Eigen::Vector2d& pixel, double seen) const {
-    return wall_light(view_, (pixel - half_) / half_.norm(), seen);
-  }
-
- private:
-  Eigen::Vector2d half_;
-  Eigen::VectorXd view_;
-  Eigen::Vector2d last_{0.0, 0.0};
-};
-
 /// The picture as seen straight on: the mean of places of every pixel.
 Image rectified(const Photograph& photo, const Eigen::VectorXd& view, const Image& target) {
   constexpr int kParts = 3;
@@ -251,12 +211,15 @@ DeviationName name_of(Deviation deviation) {
       {"distance", "the wall's distance"},
       {"tilt_x", "the wall's tilt about its horizontal axis"},
       {"tilt_y", "the wall's tilt about its vertical axis"},
+      {"part_tilt_x", "the part's tilt about its horizontal axis"},
+      {"part_tilt_y", "the part's tilt about its vertical axis"},
       {"lamp_size", "the lamp's size"},
       {"lamp_distance", "the lamp's distance"},
       {"index", "the refractive index"},
       {"polish_sigma", "the polish"},
       {"ball_radius", "the finishing ball"},
       {"pitch_error", "the pitch error"},
+      {"backlash", "backlash"},
       {"haze", "haze"},
   }};
   return kNames[static_cast<std::size_t>(deviation)];
@@ -278,6 +241,11 @@ std::vector<Deviation> told_of(const CheckResult& result, const Lens& lens) {
   return told;
 }
 
+/// Standard error of a root. @param error  of its square.
+double root_error(double root, double error) {
+  return error / std::max(2.0 * root, std::sqrt(error));
+}
+
 /// A deviation in the unit that people measure it in.
 struct Measured {
   double value = 0.0;
@@ -296,12 +264,13 @@ Measured measured(Deviation deviation, double value, double error, const Lens& l
               wall_distance(setup), " mm"};
     case Deviation::kTiltX:
     case Deviation::kTiltY:
+    case Deviation::kPartTiltX:
+    case Deviation::kPartTiltY:
       return {kDegrees * value, kDegrees * error, 0.0, "°"};
     case Deviation::kLampSize: {
       const double nominal = lamp_angle(setup);
       const double angle = std::sqrt(std::max(nominal * nominal + value, 0.0));
-      return {1e3 * angle, 1e3 * error / std::max(2.0 * angle, std::sqrt(error)), 1e3 * nominal,
-              " mrad"};
+      return {1e3 * angle, 1e3 * root_error(angle, error), 1e3 * nominal, " mrad"};
     }
     case Deviation::kLampDistance: {
       const auto lamp = lamp_distance(setup);
@@ -323,6 +292,8 @@ Measured measured(Deviation deviation, double value, double error, const Lens& l
       const double nominal = 100.0 * options.workshop.process.finish.pitch_error;
       return {nominal + 100.0 * value, 100.0 * error, nominal, " %"};
     }
+    case Deviation::kBacklash:
+      return {1e3 * value, 1e3 * error, 0.0, " µm"};
     case Deviation::kHaze:
       break;
   }
@@ -347,6 +318,13 @@ std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions
       // The screen's x axis points to the picture's left in the view of lenses from their front.
       return "the wall is tilted by " + off + " about its vertical axis: move its " +
              (more == (lens.setup.view == ViewSide::kFront) ? "right" : "left") + " edge nearer";
+    case Deviation::kPartTiltX:
+      return "the part is tilted by " + off + " about its horizontal axis: turn its " +
+             (more ? "lower" : "upper") + " edge towards the wall";
+    case Deviation::kPartTiltY:
+      return "the part is tilted by " + off + " about its vertical axis: turn its " +
+             (more == (lens.setup.view == ViewSide::kFront) ? "left" : "right") +
+             " edge towards the wall";
     case Deviation::kLampSize:
       return "the lamp is " + now + " wide" + planned + ": use a " +
              (more ? "smaller or farther" : "larger or nearer") + " one, or design for it";
@@ -363,6 +341,10 @@ std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions
     case Deviation::kPitch:
       return "the machine goes " + now + " too far across the rows" +
              (m.nominal == 0.0 ? "" : planned) + ": correct its steps per mm";
+    case Deviation::kBacklash:
+      return "the axis along the rows has " + off + " of backlash" +
+             (more ? "" : " less than none") + ": let the controller compensate " +
+             (more ? "more" : "less") + ", or finish in one direction (finish.style \"climb\")";
     case Deviation::kHaze:
       break;
   }
@@ -534,7 +516,7 @@ std::string measured_table(const CheckResult& result, const Lens& lens, const Ca
                  "Each as if nothing but it and the causes above were other than planned. The "
                  "wall's distance" +
                      std::string(result.chart ? "" : ", the lamp's") +
-                     " and the index change a picture alike.");
+                     " and the index change a picture alike, and so do tilts of wall and part.");
 }
 
 std::string report_page(const CheckResult& result, const Lens& lens, const CamOptions& options,
@@ -619,7 +601,7 @@ void add_distance(const FoundCause& cause, const OpticalSetup& setup, NextLens& 
 void add_lamp(const FoundCause& cause, const OpticalSetup& setup, NextLens& next) {
   const double nominal = lamp_angle(setup);
   const double angle = std::sqrt(std::max(nominal * nominal + cause.value, 0.0));
-  const double error = cause.error / std::max(2.0 * angle, std::sqrt(cause.error));
+  const double error = root_error(angle, cause.error);
   if (const auto away = lamp_distance(setup)) {
     next.options.push_back(
         {"--source-size", number_text(to_digits(*away * angle, *away * error)) + "mm"});

@@ -13,6 +13,7 @@
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/plan/finishing.h"
+#include "cam/tolerance/part_light.h"
 #include "core/error.h"
 #include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
@@ -57,6 +58,28 @@ void move_lamp(OpticalSetup& setup, double vergence) {
   setup.extent.width = angle / vergence;
 }
 
+/// Where the light of the lens's middle lands if the surface is level there: mm on the screen from
+/// the picture's middle.
+Eigen::Vector2d middle_landing(const OpticalSetup& setup, double height) {
+  const LightPath path(setup);
+  const Eigen::Vector3d middle = lens_centre(setup) + height * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector2d pixel = path.land(middle, path.beam(middle, Eigen::Vector3d::UnitZ()).m);
+  return path.plane().to_mm(pixel) - setup.screen_centre().head<2>();
+}
+
+/// The light through a tilted part. Like every tilted plate it moves all light sideways, by some
+/// pixels, which no photograph shows: the picture's window goes with it, so that details keep their
+/// places.
+OpticalSetup with_part_tilt(const OpticalSetup& straight, const Eigen::Vector2d& tilt,
+                            double height) {
+  OpticalSetup seen = seen_by_turned_part(straight, tilt);
+  const Eigen::Vector2d moved = middle_landing(seen, height) - middle_landing(straight, height);
+  const Eigen::Vector3d by = moved.x() * seen.screen_x + moved.y() * seen.screen_y;
+  seen.image_origin += by.head<2>();
+  seen.focal_length += by.z();
+  return seen;
+}
+
 }  // namespace
 
 Deviations deviation_steps(const OpticalSetup& setup) {
@@ -65,12 +88,15 @@ Deviations deviation_steps(const OpticalSetup& setup) {
   steps[index_of(Deviation::kDistance)] = 0.01;
   steps[index_of(Deviation::kTiltX)] = 0.02;
   steps[index_of(Deviation::kTiltY)] = 0.02;
+  steps[index_of(Deviation::kPartTiltX)] = 0.02;
+  steps[index_of(Deviation::kPartTiltY)] = 0.02;
   steps[index_of(Deviation::kLampSize)] = pixel * pixel;
   steps[index_of(Deviation::kLampDistance)] = 0.01;
   steps[index_of(Deviation::kIndex)] = 0.01;
   steps[index_of(Deviation::kPolish)] = 0.1;
   steps[index_of(Deviation::kBall)] = 0.05;
   steps[index_of(Deviation::kPitch)] = 0.003;
+  steps[index_of(Deviation::kBacklash)] = 0.005;
   steps[index_of(Deviation::kHaze)] = 0.05;
   return steps;
 }
@@ -78,8 +104,8 @@ Deviations deviation_steps(const OpticalSetup& setup) {
 DeviationLimits deviation_limits(const OpticalSetup& setup) {
   const double pixel = setup.image_size.x() / setup.pixels.x() / setup.focal_length;
   DeviationLimits limits;
-  limits.most << 0.25, 0.3, 0.3, 100.0 * pixel * pixel, 0.3, 0.1, std::log(kMostPolish), 0.5, 0.02,
-      0.6;
+  limits.most << 0.25, 0.3, 0.3, 0.3, 0.3, 100.0 * pixel * pixel, 0.3, 0.1, std::log(kMostPolish),
+      0.5, 0.02, 0.2, 0.6;
   limits.least = -limits.most;
   limits.least[index_of(Deviation::kHaze)] = 0.0;
   // No lamp is farther than that of parallel light.
@@ -199,14 +225,36 @@ void WallModel::plan_rows(const CutSetup& setup, const RunControl& control) {
 
 bool WallModel::is_kept_whole() const { return grid_.size() <= kMostNodes; }
 
-std::shared_ptr<const WallModel::Cut> WallModel::cut(double ball, double pitch_error) const {
-  return cuts_.of({ball, pitch_error}, [&] {
+namespace {
+
+/// A way as a slide with a backlash goes it, half of that behind in the direction of the way: ways
+/// to and fro lie as far apart as the backlash.
+RasterWay lagging(RasterWay way, double backlash) {
+  if (backlash == 0.0 || way.moves.empty()) return way;
+  const Eigen::Vector2d run = (way.moves.back().end - way.start).head<2>();
+  const int axis = std::abs(run.x()) > std::abs(run.y()) ? 0 : 1;
+  const double lag = 0.5 * std::copysign(1.0, run[axis]) * backlash;
+  way.start[axis] -= lag;
+  for (PathMove& move : way.moves) {
+    move.end[axis] -= lag;
+    move.centre[axis] -= lag;
+  }
+  return way;
+}
+
+}  // namespace
+
+std::shared_ptr<const WallModel::Cut> WallModel::cut(const CutKey& made_with) const {
+  const auto [ball, pitch_error, backlash] = made_with;
+  return cuts_.of(made_with, [&, ball = ball, pitch_error = pitch_error, backlash = backlash] {
     FinishProcess finish = options_.workshop.process.finish;
     finish.pitch_error = pitch_error;
     std::vector<BallPath> paths;
     for (const BallRows& rows : rows_) {
       BallPath& path = paths.emplace_back(rows.radius * (1.0 + ball), 0.0);
-      for (const RasterRow& row : rows.rows) add_way(row, AxisStretch::of(finish), path);
+      for (const RasterRow& row : rows.rows) {
+        add_way(lagging(row, backlash), AxisStretch::of(finish), path);
+      }
     }
     auto made = std::make_shared<const Cut>(std::move(paths), blank_top_);
     // At once as far as any polish of it reaches, so that it is not cut again for a wider one.
@@ -221,12 +269,12 @@ std::shared_ptr<const WallModel::Cut> WallModel::cut(double ball, double pitch_e
 std::shared_ptr<const WallModel::Part> WallModel::part(const Deviations& deviations) const {
   PolishModel polish = options_.workshop.polish;
   polish.sigma *= std::exp(deviations[index_of(Deviation::kPolish)]);
-  const double ball = deviations[index_of(Deviation::kBall)];
-  const double pitch_error =
-      options_.workshop.process.finish.pitch_error + deviations[index_of(Deviation::kPitch)];
-  return parts_.of({polish.sigma, ball, pitch_error}, [&] {
-    return std::make_shared<const Part>(cut(ball, pitch_error), polish, *this);
-  });
+  const CutKey made{
+      deviations[index_of(Deviation::kBall)],
+      options_.workshop.process.finish.pitch_error + deviations[index_of(Deviation::kPitch)],
+      deviations[index_of(Deviation::kBacklash)]};
+  return parts_.of({polish.sigma, made},
+                   [&] { return std::make_shared<const Part>(cut(made), polish, *this); });
 }
 
 std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& optics) const {
@@ -246,6 +294,11 @@ bool WallModel::shows(Deviation deviation) const {
     case Deviation::kBall:
     case Deviation::kPitch:
       return has_part();
+    case Deviation::kBacklash:
+      return has_part() && options_.workshop.process.finish.style == PassStyle::kZigzag;
+    // A mirror that is turned sends its picture elsewhere.
+    case Deviation::kPartTiltX:
+    case Deviation::kPartTiltY:
     case Deviation::kIndex:
     case Deviation::kHaze:
       return traits(lens_.setup.body).transmits;
@@ -292,7 +345,8 @@ OpticalSetup WallModel::optics_of(const Deviations& deviations) const {
     optics.screen_x = turn * optics.screen_x;
     optics.screen_y = turn * optics.screen_y;
   }
-  return optics;
+  const Eigen::Vector2d tilt(of(Deviation::kPartTiltX), of(Deviation::kPartTiltY));
+  return tilt.isZero() ? optics : with_part_tilt(optics, tilt, height_);
 }
 
 Haze WallModel::haze_at(const OpticalSetup& optics, double more) const {

@@ -23,18 +23,21 @@ namespace lensforge {
 
 /// What may differ between a lens's forecast and its picture on a wall.
 enum class Deviation {
-  kDistance,  ///< Of the wall, a share of the lens's distance from it.
-  kTiltX,     ///< Of the wall about its horizontal axis, rad.
-  kTiltY,     ///< About its vertical axis, rad.
+  kDistance,   ///< Of the wall, a share of the lens's distance from it.
+  kTiltX,      ///< Of the wall about its horizontal axis, rad.
+  kTiltY,      ///< About its vertical axis, rad.
+  kPartTiltX,  ///< Of the part about the lens's x axis, rad; lamp and wall stay.
+  kPartTiltY,  ///< About its y axis, rad.
   kLampSize,  ///< Square of the lamp's full angle as seen from the lens, minus the design's, rad².
   kLampDistance,  ///< 1 / distance of the lamp, minus the design's, as a share of 1 / focal length.
   kIndex,         ///< Of (n − 1), a share.
   kPolish,        ///< ln(σ / σ of the workshop).
   kBall,          ///< Of the finishing ball's radius, a share.
   kPitch,         ///< FinishProcess::pitch_error beyond the workshop's, a share.
+  kBacklash,      ///< Of the axis along the rows, mm; < 0: compensated by too much.
   kHaze,          ///< Haze::share beyond the workshop's.
 };
-inline constexpr std::size_t kDeviations = 10;
+inline constexpr std::size_t kDeviations = 13;
 
 /// One value of each Deviation, all 0 for the forecast.
 using Deviations = Eigen::Matrix<double, static_cast<int>(kDeviations), 1>;
@@ -63,9 +66,9 @@ std::optional<double> lamp_distance(const OpticalSetup& setup);
 /// surface (MilledField), which is polished (PolishedField) and rendered (render_field(), a lamp
 /// with a width by a convolution). Where parts cannot be drawn (tolerance_fault(), creases) it is
 /// the lens as designed.
-/// Every step is kept and done anew only for the deviations that it depends on: a cut by ball and
-/// pitch error, a part by these and its polish, its light by these, the lamp and the wall. Not for
-/// several threads at once.
+/// Every step is kept and done anew only for the deviations that it depends on: a cut by ball,
+/// pitch error and backlash, a part by these and its polish, its light by these, the lamp and the
+/// wall. Not for several threads at once.
 class WallModel {
  public:
   /// @param lens  must outlive this. @param options  with the workshop.
@@ -129,8 +132,9 @@ class WallModel {
   };
 
   void plan_rows(const CutSetup& setup, const RunControl& control);
-  /// Of a ball, a share, and a pitch error.
-  [[nodiscard]] std::shared_ptr<const Cut> cut(double ball, double pitch_error) const;
+  /// What a cut depends on: the ball's radius, a share; the pitch error; the backlash, mm.
+  using CutKey = std::array<double, 3>;
+  [[nodiscard]] std::shared_ptr<const Cut> cut(const CutKey& made) const;
   [[nodiscard]] std::shared_ptr<const Part> part(const Deviations& deviations) const;
   /// Shares of the light of a part.
   [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
@@ -153,8 +157,8 @@ class WallModel {
   std::vector<BallRows> rows_;  ///< Empty if there is no part.
   GridWindow grid_;             ///< On which parts are sampled, if there is one.
   Executor executor_;
-  mutable Kept<std::array<double, 2>, std::shared_ptr<const Cut>> cuts_;
-  mutable Kept<std::array<double, 3>, std::shared_ptr<const Part>> parts_;
+  mutable Kept<CutKey, std::shared_ptr<const Cut>> cuts_;
+  mutable Kept<std::pair<double, CutKey>, std::shared_ptr<const Part>> parts_;
   mutable Kept<Deviations, std::vector<double>> lights_;
   mutable Kept<Deviations, Image> pictures_;
 };

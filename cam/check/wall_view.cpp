@@ -234,6 +234,36 @@ double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, dou
   return (light / falloff_of(view, pixel) - room_of(view, pixel)) / view[view::kGain];
 }
 
+/// Newton's steps, bounded: towards places that no pixel shows they have no end.
+bool WallToPhoto::follow(const Eigen::Vector2d& wall) {
+  constexpr double kStep = 1e-5;
+  constexpr int kSteps = 12;
+  constexpr double kLongest = 0.5;  // Half diagonals of the photograph.
+  for (int k = 0; k < kSteps; ++k) {
+    const Eigen::Vector2d off = wall_of(view_, last_) - wall;
+    Eigen::Matrix2d slope;
+    for (int axis = 0; axis < 2; ++axis) {
+      const Eigen::Vector2d moved = last_ + kStep * Eigen::Vector2d::Unit(axis);
+      slope.col(axis) = (wall_of(view_, moved) - wall - off) / kStep;
+    }
+    const Eigen::Vector2d step = slope.partialPivLu().solve(off);
+    if (!step.allFinite()) return false;
+    last_ -= step * std::min(1.0, kLongest / step.norm());
+    if (step.norm() < 1e-9) return true;
+  }
+  return false;
+}
+
+Eigen::Vector2d WallToPhoto::at(const Eigen::Vector2d& wall) {
+  constexpr double kFarthest = 2.0;
+  if (!follow(wall)) {
+    last_.setZero();  // The place before may lie beyond a distortion's fold.
+    follow(wall);
+  }
+  if (last_.norm() > kFarthest) last_.setZero();
+  return half_ + last_ * half_.norm();
+}
+
 namespace {
 
 /// Light added to both sides before they are compared: below some hundredths of white a camera's

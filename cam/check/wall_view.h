@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cam/check/chart.h"
@@ -95,6 +96,31 @@ Eigen::Vector2d wall_of(const Eigen::VectorXd& view, const Eigen::Vector2d& pixe
 
 /// Light p of the wall's picture from that of a pixel. @param pixel  X.
 double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, double light);
+
+/// Pixel coordinates at which a photograph shows a place on the wall: Newton's steps from the place
+/// before. Where a strong distortion shows no such place it is one in or near the photograph.
+class WallToPhoto {
+ public:
+  /// @param photo  of which the view is.
+  WallToPhoto(const Photograph& photo, Eigen::VectorXd view)
+      : half_(0.5 * Eigen::Vector2d(photo.light.columns(), photo.light.rows())),
+        view_(std::move(view)) {}
+
+  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& wall);
+
+  /// Light of the wall's picture from that of the photograph at pixel coordinates.
+  [[nodiscard]] double light(const Eigen::Vector2d& pixel, double seen) const {
+    return wall_light(view_, (pixel - half_) / half_.norm(), seen);
+  }
+
+ private:
+  /// Goes on from the last place. @return true if it was found.
+  bool follow(const Eigen::Vector2d& wall);
+
+  Eigen::Vector2d half_;
+  Eigen::VectorXd view_;
+  Eigen::Vector2d last_{0.0, 0.0};  ///< In half diagonals.
+};
 
 /// Pixels of a photograph that see the wall around a picture, and their light, as display values:
 /// sRGB's of 2 % of white more than the light. Where the photograph has a chart, its ChartTie's

@@ -23,9 +23,11 @@ Eigen::Vector3d centre_of(const OpticalSetup& setup) {
   return {0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0};
 }
 
-/// Lamp and screen in the frame of a part turned about its centre: turned the other way.
-void turn_back(OpticalSetup& seen, const Eigen::Matrix3d& turn) {
-  const Eigen::Matrix3d back = turn.transpose();
+}  // namespace
+
+/// They are turned the other way.
+OpticalSetup seen_by_turned_part(OpticalSetup seen, const Eigen::Vector2d& tilt) {
+  const Eigen::Matrix3d back = turn_of(tilt).transpose();
   const Eigen::Vector3d centre = centre_of(seen);
   const Eigen::Vector3d screen = centre + back * (seen.screen_centre() - centre);
   seen.lamp =
@@ -34,7 +36,10 @@ void turn_back(OpticalSetup& seen, const Eigen::Matrix3d& turn) {
   seen.screen_y = back * seen.screen_y;
   seen.image_origin = screen.head<2>() - 0.5 * seen.image_size;
   seen.focal_length = screen.z();
+  return seen;
 }
+
+namespace {
 
 /// The setup in the part's own frame.
 OpticalSetup seen_by_part(const OpticalSetup& setup, const PartError& error) {
@@ -46,8 +51,7 @@ OpticalSetup seen_by_part(const OpticalSetup& setup, const PartError& error) {
   const Eigen::Vector3d away = error.distance * setup.screen_x.cross(setup.screen_y);
   seen.image_origin += away.head<2>();
   seen.focal_length += away.z();
-  if (!error.tilt.isZero()) turn_back(seen, turn_of(error.tilt));
-  return seen;
+  return error.tilt.isZero() ? seen : seen_by_turned_part(seen, error.tilt);
 }
 
 /// True for parallel light along a lens's axis onto a screen parallel to it.

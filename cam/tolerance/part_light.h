@@ -14,6 +14,10 @@
 
 namespace lensforge {
 
+/// Lamp and screen as a part sees them that is turned about the lens's middle.
+/// @param tilt  about x, then about y, rad.
+OpticalSetup seen_by_turned_part(OpticalSetup setup, const Eigen::Vector2d& tilt);
+
 /// Places on a part before thermal growth, mm: a grid, row by row.
 struct PartNodes {
   std::size_t columns = 0;

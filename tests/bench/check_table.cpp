@@ -19,6 +19,7 @@
 #include "cam/check/virtual_wall.h"
 #include "cam/check/wall_model.h"
 #include "cam/check/wall_view.h"
+#include "cam/workshop/workshop.h"
 #include "core/image/image_io.h"
 #include "core/lens/lens.h"
 #include "core/text/number_text.h"
@@ -26,10 +27,12 @@
 /// Photographs of a virtual wall with known faults, and what `check` names: the tables of
 /// docs/check.md.
 ///
-///     check_table LENS [PHOTOGRAPHS-OF-EACH-CAUSE [WITH-TWO [WITHOUT-ANY [FOLDER]]]]
+///     check_table LENS [PHOTOGRAPHS-OF-EACH-CAUSE [WITH-TWO [WITHOUT-ANY [FOLDER [WORKSHOP
+///     [ROW]]]]]]
 ///
 /// "waves" for LENS is that of the tests, 4 mm and 32² pixels. A folder gets the photographs, for a
-/// look at them with `lensforge check`.
+/// look at them with `lensforge check`. WORKSHOP is a file with the workshop that makes the parts
+/// and forecasts them; "" for FOLDER or WORKSHOP: none. With ROW, that row's photographs alone.
 namespace lensforge {
 namespace {
 
@@ -37,7 +40,8 @@ using virtual_wall::Fault;
 
 /// A cause as people name it: deviations that mean the same are one.
 struct Cause {
-  std::string name;
+  std::string row;   ///< Of the table.
+  std::string name;  ///< Several rows may be of one cause, in different sizes.
   std::set<Deviation> deviations;
   /// Puts a random fault of it, by two numbers in −1 … 1.
   void (*put)(Fault& fault, double size, double sign);
@@ -53,14 +57,29 @@ double drawn(double middle, double size, double sign) {
   return std::copysign(middle * (1.0 + 0.5 * size), sign);
 }
 
+void put_part_tilt(Fault& f, double middle, double a, double b) {
+  (std::fmod(std::abs(17.0 * a), 1.0) < 0.5 ? f.part_tilt_x : f.part_tilt_y) = drawn(middle, a, b);
+}
+
+double part_tilt_found(const Deviations& d, double) {
+  return of(d, Deviation::kPartTiltX) + of(d, Deviation::kPartTiltY);
+}
+
+double backlash_found(const Deviations& d, double) { return of(d, Deviation::kBacklash); }
+
+/// The first rows of causes(), of which pairs are made.
+constexpr std::size_t kInPairs = 7;
+
 const std::vector<Cause>& causes() {
   static const std::vector<Cause> kCauses = {
       {"distance",
+       "distance",
        {Deviation::kDistance},
        [](Fault& f, double a, double b) { f.distance = drawn(0.03, a, b); },
        [](const Fault& f) { return f.distance; },
        [](const Deviations& d, double) { return of(d, Deviation::kDistance); }},
       {"tilt",
+       "tilt",
        {Deviation::kTiltX, Deviation::kTiltY},
        [](Fault& f, double a, double b) {
          (std::fmod(std::abs(17.0 * a), 1.0) < 0.5 ? f.tilt_x : f.tilt_y) = drawn(0.06, a, b);
@@ -70,6 +89,7 @@ const std::vector<Cause>& causes() {
          return of(d, Deviation::kTiltX) + of(d, Deviation::kTiltY);
        }},
       {"lamp",
+       "lamp",
        {Deviation::kLampSize},
        [](Fault& f, double a, double b) { f.lamp = drawn(0.5, a, b); },
        [](const Fault& f) { return f.lamp; },
@@ -77,25 +97,59 @@ const std::vector<Cause>& causes() {
          return std::sqrt(std::max(1.0 + of(d, Deviation::kLampSize) / (lamp * lamp), 0.0)) - 1.0;
        }},
       {"polish",
+       "polish",
        {Deviation::kPolish},
        [](Fault& f, double a, double b) { f.sigma = drawn(0.35, a, b); },
        [](const Fault& f) { return f.sigma; },
        [](const Deviations& d, double) { return std::exp(of(d, Deviation::kPolish)) - 1.0; }},
       {"ball",
+       "ball",
        {Deviation::kBall},
        [](Fault& f, double a, double b) { f.ball = drawn(0.15, a, b); },
        [](const Fault& f) { return f.ball; },
        [](const Deviations& d, double) { return of(d, Deviation::kBall); }},
       {"pitch error",
+       "pitch error",
        {Deviation::kPitch},
        [](Fault& f, double a, double b) { f.pitch_error = drawn(0.005, a, b); },
        [](const Fault& f) { return f.pitch_error; },
        [](const Deviations& d, double) { return of(d, Deviation::kPitch); }},
       {"haze",
+       "haze",
        {Deviation::kHaze},
        [](Fault& f, double a, double) { f.haze = drawn(0.12, a, 1.0); },
        [](const Fault& f) { return f.haze; },
        [](const Deviations& d, double) { return of(d, Deviation::kHaze); }},
+      {"part tilt",
+       "part tilt",
+       {Deviation::kPartTiltX, Deviation::kPartTiltY},
+       [](Fault& f, double a, double b) { put_part_tilt(f, 0.03, a, b); },
+       [](const Fault& f) { return f.part_tilt_x + f.part_tilt_y; },
+       part_tilt_found},
+      {"large part tilt",
+       "part tilt",
+       {Deviation::kPartTiltX, Deviation::kPartTiltY},
+       [](Fault& f, double a, double b) { put_part_tilt(f, 0.12, a, b); },
+       [](const Fault& f) { return f.part_tilt_x + f.part_tilt_y; },
+       part_tilt_found},
+      {"backlash",
+       "backlash",
+       {Deviation::kBacklash},
+       [](Fault& f, double a, double) { f.backlash = drawn(0.003, a, 1.0); },
+       [](const Fault& f) { return f.backlash; },
+       backlash_found},
+      {"large backlash",
+       "backlash",
+       {Deviation::kBacklash},
+       [](Fault& f, double a, double) { f.backlash = drawn(0.03, a, 1.0); },
+       [](const Fault& f) { return f.backlash; },
+       backlash_found},
+      {"index",
+       "index",
+       {Deviation::kIndex},
+       [](Fault& f, double a, double b) { f.index = drawn(0.003, a, b); },
+       [](const Fault& f) { return f.index; },
+       [](const Deviations&, double) { return 0.0; }},
   };
   return kCauses;
 }
@@ -104,7 +158,7 @@ std::string name_of(Deviation deviation) {
   for (const Cause& cause : causes()) {
     if (cause.deviations.contains(deviation)) return cause.name;
   }
-  return deviation == Deviation::kIndex ? "index" : "lamp distance";
+  return "lamp distance";
 }
 
 /// The likeliest cause and those that the fit cannot tell from it.
@@ -124,9 +178,10 @@ std::set<std::string> names_of(const CauseFit& fit) {
 
 class Bench {
  public:
-  Bench(const Lens& lens, std::string folder)
+  Bench(const Lens& lens, std::string folder, CamOptions options)
       : lens_(lens),
         folder_(std::move(folder)),
+        options_(std::move(options)),
         workshop_(lens, options_, executor_),
         model_(lens, options_, 5, executor_, {}) {}
 
@@ -186,10 +241,12 @@ std::string first_of(const CauseFit& fit) {
 }
 
 void print(const Confusion& confusion) {
+  std::set<std::string> names{"lamp distance", "nothing"};
+  for (const Cause& cause : causes()) names.insert(cause.name);
   std::cout << "| wrong | ";
-  for (const Cause& cause : causes()) std::cout << cause.name << " | ";
-  std::cout << "index or lamp distance | nothing |\n|---|";
-  for (std::size_t k = 0; k < causes().size() + 2; ++k) std::cout << "---|";
+  for (const std::string& name : names) std::cout << name << " | ";
+  std::cout << "\n|---|";
+  for (std::size_t k = 0; k < names.size(); ++k) std::cout << "---|";
   std::cout << "\n";
   for (const auto& [wrong, row] : confusion) {
     std::cout << "| " << wrong << " | ";
@@ -197,8 +254,8 @@ void print(const Confusion& confusion) {
       const auto cell = cells.find(name);
       return cell == cells.end() ? 0 : cell->second;
     };
-    for (const Cause& cause : causes()) std::cout << count(cause.name) << " | ";
-    std::cout << count("index") + count("lamp distance") << " | " << count("nothing") << " |\n";
+    for (const std::string& name : names) std::cout << count(name) << " | ";
+    std::cout << "\n";
   }
 }
 
@@ -219,7 +276,8 @@ struct Draw {
 /// A name counts as right if the likeliest cause's group has it and at most one more.
 constexpr std::size_t kLargestGroup = 2;
 
-void run_single(const Bench& bench, int each, Draw& draw, Confusion& confusion) {
+void run_single(const Bench& bench, int each, const std::string& only, Draw& draw,
+                Confusion& confusion) {
   std::uint64_t seed = 100;
   std::cout << "| cause | right | alone | median error | 9 of 10 |\n|---|---|---|---|---|\n";
   for (const Cause& cause : causes()) {
@@ -230,23 +288,26 @@ void run_single(const Bench& bench, int each, Draw& draw, Confusion& confusion) 
       Fault fault;
       const double size = draw();
       cause.put(fault, size, draw());
+      ++seed;
+      if (!only.empty() && cause.row != only) continue;
       const double truth = cause.truth(fault);
       const CauseFit fit =
-          bench.run(bench.light(fault), ++seed, cause.name + " " + number_text(truth, 3));
+          bench.run(bench.light(fault), seed, cause.row + " " + number_text(truth, 3));
       const std::set<std::string> group = first_group(fit);
-      ++confusion[cause.name][first_of(fit)];
+      ++confusion[cause.row][first_of(fit)];
       right += group.contains(cause.name) && group.size() <= kLargestGroup ? 1 : 0;
       alone += names_of(fit) == std::set<std::string>{cause.name} ? 1 : 0;
       off.push_back(std::abs(cause.found(fit.deviations, bench.lamp()) - truth));
     }
-    std::cout << "| " << cause.name << " | " << right << " of " << each << " | " << alone << " | ";
+    if (off.empty()) continue;
+    std::cout << "| " << cause.row << " | " << right << " of " << each << " | " << alone << " | ";
     print_errors(std::move(off));
   }
 }
 
 void run_pairs(const Bench& bench, int pairs, Draw& draw) {
   int both = 0;
-  const std::size_t count = causes().size();
+  const std::size_t count = kInPairs;
   for (int k = 0; k < pairs; ++k) {
     const auto pair = static_cast<std::size_t>(k);
     const std::size_t one = pair % count;
@@ -276,19 +337,26 @@ void print_alone(const std::vector<CauseFit>& fits) {
   std::cout << "\n";
 }
 
-void run(const Lens& lens, int each, int pairs, int without, const std::string& folder) {
-  const Bench bench(lens, folder);
+/// What is asked for.
+struct Task {
+  int each = 29;
+  int pairs = 50;
+  int without = 50;
+  std::string only;  ///< Row; empty: all.
+};
+
+void run(const Bench& bench, const Task& task) {
   Draw draw;
   Confusion confusion;
   std::vector<CauseFit> nothing;
   const virtual_wall::WallLight light = bench.light({});
-  for (int k = 1; k <= without; ++k) {
+  for (int k = 1; k <= task.without; ++k) {
     nothing.push_back(bench.run(light, static_cast<std::uint64_t>(k), "nothing"));
     ++confusion["nothing"][first_of(nothing.back())];
   }
   print_alone(nothing);
-  run_single(bench, each, draw, confusion);
-  run_pairs(bench, pairs, draw);
+  run_single(bench, task.each, task.only, draw, confusion);
+  run_pairs(bench, task.pairs, draw);
   std::cout << "\n";
   print(confusion);
 }
@@ -297,15 +365,20 @@ void run(const Lens& lens, int each, int pairs, int without, const std::string& 
 }  // namespace lensforge
 
 int main(int argc, char** argv) {
+  using namespace lensforge;
   try {
-    if (argc < 2) throw std::runtime_error("check_table LENS [EACH [PAIRS [WITHOUT [FOLDER]]]]");
+    if (argc < 2) {
+      throw std::runtime_error(
+          "check_table LENS [EACH [PAIRS [WITHOUT [FOLDER [WORKSHOP [ROW]]]]]]");
+    }
+    const auto text = [&](int k) { return std::string(argc > k ? argv[k] : ""); };
     const auto count = [&](int k, int otherwise) {
       return argc > k ? std::atoi(argv[k]) : otherwise;
     };
-    const std::string lens = argv[1];
-    lensforge::run(
-        lens == "waves" ? lensforge::virtual_wall::wavy_lens() : lensforge::read_lens(lens),
-        count(2, 29), count(3, 50), count(4, 50), argc > 5 ? argv[5] : "");
+    const Lens lens = text(1) == "waves" ? virtual_wall::wavy_lens() : read_lens(text(1));
+    CamOptions options;
+    if (!text(6).empty()) options.workshop = read_workshop(text(6));
+    run(Bench(lens, text(5), options), {count(2, 29), count(3, 50), count(4, 50), text(7)});
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

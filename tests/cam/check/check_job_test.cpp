@@ -79,6 +79,10 @@ TEST_F(CheckJob, WordsSayWhatToDo) {
   EXPECT_EQ(words(Deviation::kDistance, 0.05),
             "the wall is 0.80 ± 0.08 mm too far: move it nearer");
   EXPECT_THAT(words(Deviation::kTiltX, 0.1), HasSubstr("move its upper edge nearer"));
+  EXPECT_THAT(words(Deviation::kPartTiltX, 0.1), HasSubstr("turn its lower edge towards the wall"));
+  EXPECT_THAT(words(Deviation::kPartTiltY, 0.1), HasSubstr("turn its left edge towards the wall"));
+  EXPECT_THAT(words(Deviation::kBacklash, 0.02), HasSubstr("has 20.0 ± 2.0 µm of backlash: let"));
+  EXPECT_THAT(words(Deviation::kBacklash, -0.02), HasSubstr("let the controller compensate less"));
   EXPECT_THAT(words(Deviation::kLampDistance, 0.1), HasSubstr("instead of far away"));
   EXPECT_THAT(words(Deviation::kPolish, 0.3), HasSubstr("polish less"));
   EXPECT_THAT(words(Deviation::kHaze, 0.1), HasSubstr("10.0 ± 1.0 % of the light"));

@@ -41,6 +41,27 @@ OpticalSetup at_point(OpticalSetup setup, const Eigen::Vector2d& point) {
   return setup;
 }
 
+/// The part stays in its frame: lamp and wall turn about the lens's middle, in the opposite sense.
+void tilt_part(OpticalSetup& setup, const Fault& fault) {
+  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(-fault.part_tilt_x, Eigen::Vector3d::UnitX()) *
+                                Eigen::AngleAxisd(-fault.part_tilt_y, Eigen::Vector3d::UnitY()))
+                                   .toRotationMatrix();
+  const Eigen::Vector3d middle(0.5 * setup.lens_size.x(), 0.5 * setup.lens_size.y(), 0.0);
+  if (auto* const point = std::get_if<PointSource>(&setup.lamp)) {
+    point->position = middle + turn * (point->position - middle);
+  } else {
+    auto& light = std::get<ParallelLight>(setup.lamp);
+    light.direction = turn * light.direction;
+  }
+  Eigen::Vector3d screen;
+  screen << setup.image_origin + 0.5 * setup.image_size, setup.focal_length;
+  screen = middle + turn * (screen - middle);
+  setup.image_origin = screen.head<2>() - 0.5 * setup.image_size;
+  setup.focal_length = screen.z();
+  setup.screen_x = turn * setup.screen_x;
+  setup.screen_y = turn * setup.screen_y;
+}
+
 /// The light on a wall that is farther and turned, wider than the picture.
 OpticalSetup seen_wall(const OpticalSetup& lens, const Fault& fault) {
   OpticalSetup setup = lens;
@@ -65,6 +86,7 @@ OpticalSetup seen_wall(const OpticalSetup& lens, const Fault& fault) {
                                    .toRotationMatrix();
   setup.screen_x = turn * setup.screen_x;
   setup.screen_y = turn * setup.screen_y;
+  if (fault.part_tilt_x != 0.0 || fault.part_tilt_y != 0.0) tilt_part(setup, fault);
   return setup;
 }
 
@@ -140,10 +162,19 @@ std::vector<BallPath> Workshop::paths(const Fault& fault) const {
   for (const auto& [radius, rows] : rows_) {
     BallPath& path = paths.emplace_back(radius * (1.0 + fault.ball), 0.0);
     const MoveSink sink = path_sink(path, AxisStretch::of(finish));
+    // Every other row comes back.
+    Eigen::Vector3d lag = Eigen::Vector3d::Zero();
+    lag[finish.along == PassAxis::kX ? 0 : 1] = -0.5 * fault.backlash;
     for (const RasterRow& row : rows) {
-      const PathMove start{MoveKind::kRapid, row.start};
+      const PathMove start{MoveKind::kRapid, row.start + lag};
       sink({&start, 1});
-      sink(row.moves);
+      std::vector<PathMove> moves = row.moves;
+      for (PathMove& move : moves) {
+        move.end += lag;
+        move.centre += lag;
+      }
+      sink(moves);
+      lag = -lag;
     }
   }
   return paths;

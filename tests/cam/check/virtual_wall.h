@@ -29,12 +29,15 @@ struct Fault {
   double distance = 0.0;     ///< Of the wall, a share.
   double tilt_x = 0.0;       ///< Of the wall about the picture's x axis, rad.
   double tilt_y = 0.0;       ///< rad
+  double part_tilt_x = 0.0;  ///< Of the part about its x axis, rad.
+  double part_tilt_y = 0.0;  ///< rad
   double lamp = 0.0;         ///< Of the lamp's width, a share.
   double vergence = 0.0;     ///< Of parallel light: focal length over the lamp's distance.
   double index = 0.0;        ///< Of the index.
   double sigma = 0.0;        ///< Of the polish's σ, a share.
   double ball = 0.0;         ///< Of the ball's radius, a share.
   double pitch_error = 0.0;  ///< Across the rows, a share.
+  double backlash = 0.0;     ///< Between rows to and fro, mm.
   double haze = 0.0;         ///< Share of the light that is scattered, 25 mrad wide.
 };
 

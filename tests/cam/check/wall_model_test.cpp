@@ -51,11 +51,14 @@ std::vector<FaultCase> fault_cases(const Lens& lens) {
   add("distance", &Fault::distance, 0.03, Deviation::kDistance, 0.03);
   add("tilt about x", &Fault::tilt_x, 0.2, Deviation::kTiltX, 0.2);
   add("tilt about y", &Fault::tilt_y, -0.2, Deviation::kTiltY, -0.2);
+  add("part's tilt about x", &Fault::part_tilt_x, 0.15, Deviation::kPartTiltX, 0.15);
+  add("part's tilt about y", &Fault::part_tilt_y, -0.15, Deviation::kPartTiltY, -0.15);
   add("lamp", &Fault::lamp, 0.5, Deviation::kLampSize, 1.25 * lamp * lamp);
   add("index", &Fault::index, 0.01, Deviation::kIndex, 0.01 / (lens.setup.ior - 1.0));
   add("polish", &Fault::sigma, 0.35, Deviation::kPolish, std::log(1.35));
   add("ball", &Fault::ball, 0.3, Deviation::kBall, 0.3);
   add("pitch error", &Fault::pitch_error, 0.005, Deviation::kPitch, 0.005);
+  add("backlash", &Fault::backlash, 0.01, Deviation::kBacklash, 0.01);
   add("haze", &Fault::haze, 0.12, Deviation::kHaze, 0.12);
   return cases;
 }

@@ -175,5 +175,28 @@ TEST(WallView, ADarkPhotographTakesTheRoomsLightAway) {
   EXPECT_GT(error(photograph(lit, {}, "wall.jpg")), 0.0);
 }
 
+/// A barrel so strong that the picture's corners are nowhere in the photograph: steps towards them
+/// have no end, and the places that are asked for after them must be found all the same.
+TEST(WallView, AStronglyDistortedViewIsFollowedBack) {
+  constexpr int kPlaces = 24;
+  constexpr double kReach = 0.55;  // The fold is at 0.69.
+  const Photograph photo{Image(120, 90, 0.5F), {}, "wall.jpg"};
+  Eigen::VectorXd view = Eigen::VectorXd::Zero(view::kCount);
+  view.head(8) << 2.2, 0.05, 0.1, -0.03, 2.2, 0.02, 0.15, -0.2;
+  view.segment(view::kDistortion, 2) << -0.3, -0.5;
+  WallToPhoto seen(photo, view);
+  for (int k = 0; k < kPlaces * kPlaces; ++k) {
+    const Eigen::Vector2d share((k % kPlaces + 0.5) / kPlaces - 0.5,
+                                (k / kPlaces + 0.5) / kPlaces - 0.5);
+    const Eigen::Vector2d beyond = seen.at(3.0 * share);
+    ASSERT_TRUE(beyond.allFinite()) << share.transpose();
+    EXPECT_LT(place_in(photo.light, beyond).norm(), 2.1) << share.transpose();
+    const Eigen::Vector2d place = 2.0 * kReach * share;
+    if (place.norm() > kReach) continue;
+    const Eigen::Vector2d found = place_in(photo.light, seen.at(wall_of(view, place)));
+    EXPECT_LT((found - place).norm(), 1e-6) << place.transpose();
+  }
+}
+
 }  // namespace
 }  // namespace lensforge::wall_view_test
