@@ -39,7 +39,7 @@ Image rectified(const Photograph& photo, const Eigen::VectorXd& view, const Imag
   constexpr int kParts = 3;
   Image picture(target.columns(), target.rows());
   const double even = target.total() / (1.0 * target.columns() * target.rows());
-  WallToPhoto seen(photo, view);
+  const WallToPhoto seen(photo, view);
   for (int r = 0; r < picture.rows(); ++r) {
     for (int c = 0; c < picture.columns(); ++c) {
       double sum = 0.0;
@@ -58,7 +58,7 @@ Image rectified(const Photograph& photo, const Eigen::VectorXd& view, const Imag
 }
 
 double clipped_share(const Photograph& photo, const Eigen::VectorXd& view, const Image& target) {
-  WallToPhoto seen(photo, view);
+  const WallToPhoto seen(photo, view);
   double clipped = 0.0;
   for (int r = 0; r < target.rows(); ++r) {
     for (int c = 0; c < target.columns(); ++c) {

@@ -234,34 +234,28 @@ double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, dou
   return (light / falloff_of(view, pixel) - room_of(view, pixel)) / view[view::kGain];
 }
 
-/// Newton's steps, bounded: towards places that no pixel shows they have no end.
-bool WallToPhoto::follow(const Eigen::Vector2d& wall) {
+/// Newton's steps, bounded: towards places that no pixel shows they have no end. They begin in the
+/// middle: from a place beyond a distortion's fold they would lead to others there.
+Eigen::Vector2d WallToPhoto::at(const Eigen::Vector2d& wall) const {
   constexpr double kStep = 1e-5;
   constexpr int kSteps = 12;
   constexpr double kLongest = 0.5;  // Half diagonals of the photograph.
+  constexpr double kFarthest = 2.0;
+  Eigen::Vector2d at(0.0, 0.0);
   for (int k = 0; k < kSteps; ++k) {
-    const Eigen::Vector2d off = wall_of(view_, last_) - wall;
+    const Eigen::Vector2d off = wall_of(view_, at) - wall;
     Eigen::Matrix2d slope;
     for (int axis = 0; axis < 2; ++axis) {
-      const Eigen::Vector2d moved = last_ + kStep * Eigen::Vector2d::Unit(axis);
+      const Eigen::Vector2d moved = at + kStep * Eigen::Vector2d::Unit(axis);
       slope.col(axis) = (wall_of(view_, moved) - wall - off) / kStep;
     }
     const Eigen::Vector2d step = slope.partialPivLu().solve(off);
-    if (!step.allFinite()) return false;
-    last_ -= step * std::min(1.0, kLongest / step.norm());
-    if (step.norm() < 1e-9) return true;
+    if (!step.allFinite()) break;
+    at -= step * std::min(1.0, kLongest / step.norm());
+    if (step.norm() < 1e-9) break;
   }
-  return false;
-}
-
-Eigen::Vector2d WallToPhoto::at(const Eigen::Vector2d& wall) {
-  constexpr double kFarthest = 2.0;
-  if (!follow(wall)) {
-    last_.setZero();  // The place before may lie beyond a distortion's fold.
-    follow(wall);
-  }
-  if (last_.norm() > kFarthest) last_.setZero();
-  return half_ + last_ * half_.norm();
+  if (at.norm() > kFarthest) at.setZero();
+  return half_ + at * half_.norm();
 }
 
 namespace {

@@ -97,8 +97,7 @@ Eigen::Vector2d wall_of(const Eigen::VectorXd& view, const Eigen::Vector2d& pixe
 /// Light p of the wall's picture from that of a pixel. @param pixel  X.
 double wall_light(const Eigen::VectorXd& view, const Eigen::Vector2d& pixel, double light);
 
-/// Pixel coordinates at which a photograph shows a place on the wall: Newton's steps from the place
-/// before. Where a strong distortion shows no such place it is one in or near the photograph.
+/// Pixel coordinates at which a photograph shows places on the wall.
 class WallToPhoto {
  public:
   /// @param photo  of which the view is.
@@ -106,7 +105,8 @@ class WallToPhoto {
       : half_(0.5 * Eigen::Vector2d(photo.light.columns(), photo.light.rows())),
         view_(std::move(view)) {}
 
-  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& wall);
+  /// Where a strong distortion shows no such place it is one in or near the photograph.
+  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& wall) const;
 
   /// Light of the wall's picture from that of the photograph at pixel coordinates.
   [[nodiscard]] double light(const Eigen::Vector2d& pixel, double seen) const {
@@ -114,12 +114,8 @@ class WallToPhoto {
   }
 
  private:
-  /// Goes on from the last place. @return true if it was found.
-  bool follow(const Eigen::Vector2d& wall);
-
   Eigen::Vector2d half_;
   Eigen::VectorXd view_;
-  Eigen::Vector2d last_{0.0, 0.0};  ///< In half diagonals.
 };
 
 /// Pixels of a photograph that see the wall around a picture, and their light, as display values:

@@ -26,9 +26,9 @@
 /// What a chart on a virtual wall adds to `check`: the same photographs with it and without. The
 /// tables of docs/check.md.
 ///
-///     check_chart FOLDER [PHOTOGRAPHS-OF-EACH-CAUSE [STEEP-VIEWS]]
+///     check_chart FOLDER [PHOTOGRAPHS-OF-EACH-CAUSE [STEEP-VIEWS [ROW]]]
 ///
-/// The folder gets the chart and the photographs.
+/// The folder gets the chart and the photographs. With ROW, that row's photographs alone.
 namespace lensforge {
 namespace {
 
@@ -62,14 +62,16 @@ std::vector<Cause> causes() {
           {"distance", {Deviation::kDistance}, distance},
           {"lamp's distance", {Deviation::kLampDistance}, lamp},
           {"both distances", {Deviation::kDistance, Deviation::kLampDistance}, both},
-          {"tilt", {Deviation::kTiltX, Deviation::kTiltY}, tilt}};
+          {"tilt", {Deviation::kTiltX, Deviation::kTiltY}, tilt},
+          {"index", {Deviation::kIndex}, [](Fault& f, double a) { f.index = drawn(0.003, a); }}};
 }
 
 /// Absolute errors of what was found.
 struct Errors {
   std::vector<double> distance, lamp, tilt;
-  int right = 0;  ///< Exactly the causes were named.
-  int alone = 0;  ///< And no group was left.
+  int right = 0;     ///< Exactly the causes were named.
+  int alone = 0;     ///< And no group was left.
+  int in_group = 0;  ///< Another one was named alone, with the cause in its group.
 };
 
 double percentile(std::vector<double> values, double share) {
@@ -142,6 +144,10 @@ void take(const CauseFit& fit, const Cause& cause, const Fault& fault, Errors& e
     group = group || !found.alternatives.empty();
   }
   const bool tilt = cause.deviations.contains(Deviation::kTiltX);
+  const bool in_group = fit.found.size() == 1 && cause.deviations.size() == 1 &&
+                        std::count(fit.found[0].alternatives.begin(),
+                                   fit.found[0].alternatives.end(), *cause.deviations.begin()) > 0;
+  errors.in_group += in_group ? 1 : 0;
   const bool right = tilt ? named.size() == 1 && cause.deviations.contains(*named.begin())
                           : named == cause.deviations;
   errors.right += right ? 1 : 0;
@@ -156,7 +162,7 @@ void take(const CauseFit& fit, const Cause& cause, const Fault& fault, Errors& e
 
 void print(const std::string& name, const char* chart, const Errors& errors) {
   std::cout << "| " << name << " | " << chart << " | " << errors.right << " of "
-            << errors.distance.size() << " | " << errors.alone;
+            << errors.distance.size() << " | " << errors.alone << " | " << errors.in_group;
   for (const std::vector<double>& values : {errors.distance, errors.lamp, errors.tilt}) {
     std::cout << " | " << number_text(percentile(values, 0.5), 2) << ", "
               << number_text(percentile(values, 0.9), 2);
@@ -165,13 +171,14 @@ void print(const std::string& name, const char* chart, const Errors& errors) {
 }
 
 /// Tables of causes, with what the picture's width is off by.
-void run_causes(const Bench& bench, int each) {
+void run_causes(const Bench& bench, int each, const std::string& only) {
   std::mt19937_64 random(7);
   std::uint64_t seed = 400;
   std::vector<double> widths;
   std::vector<double> in_errors;
-  std::cout << "| wrong | chart | named exactly | alone | distance, % | lamp's distance, % of the "
-               "focal length | tilt, ° |\n|---|---|---|---|---|---|---|\n";
+  std::cout
+      << "| wrong | chart | named exactly | alone | in another's group | distance, % | lamp's "
+         "distance, % of the focal length | tilt, ° |\n|---|---|---|---|---|---|---|---|\n";
   for (const Cause& cause : causes()) {
     Errors with;
     Errors without_it;
@@ -179,7 +186,9 @@ void run_causes(const Bench& bench, int each) {
     for (int k = 0; k < each; ++k) {
       Fault fault;
       cause.put(fault, std::uniform_real_distribution<double>(-1.0, 1.0)(random));
-      const Photograph photo = bench.shot(bench.wall(fault), camera_of(++seed));
+      ++seed;
+      if (!only.empty() && cause.name != only) continue;
+      const Photograph photo = bench.shot(bench.wall(fault), camera_of(seed));
       if (!photo.chart || photo.chart->marks() < kFewestMarks) continue;
       seen += photo.chart->marks();
       const CheckResult one = bench.check(photo);
@@ -243,9 +252,9 @@ void run_steep(const Bench& bench, int count) {
 
 int main(int argc, char** argv) {
   try {
-    if (argc < 2) throw std::runtime_error("check_chart FOLDER [EACH [STEEP]]");
+    if (argc < 2) throw std::runtime_error("check_chart FOLDER [EACH [STEEP [ROW]]]");
     const lensforge::Bench bench(argv[1]);
-    lensforge::run_causes(bench, argc > 2 ? std::atoi(argv[2]) : 12);
+    lensforge::run_causes(bench, argc > 2 ? std::atoi(argv[2]) : 12, argc > 4 ? argv[4] : "");
     lensforge::run_steep(bench, argc > 3 ? std::atoi(argv[3]) : 12);
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";

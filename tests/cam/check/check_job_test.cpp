@@ -67,6 +67,18 @@ TEST_F(CheckJob, NamesTheLampAndWritesIt) {
   EXPECT_THAT(read_bytes(folder / check_file::kReport), HasSubstr("Likeliest: the lamp is"));
 }
 
+/// To first order they are the same: seven degrees are enough for what they differ by.
+TEST_F(CheckJob, TellsTheTiltOfThePartFromTheWalls) {
+  Fault fault;
+  fault.part_tilt_y = 0.12;
+  const CheckResult result = check(fault, 4);
+  ASSERT_EQ(result.fit.found.size(), 1U) << verdict_of(result, lens_, options_);
+  const FoundCause& tilt = result.fit.found.front();
+  EXPECT_EQ(tilt.deviation, Deviation::kPartTiltY) << verdict_of(result, lens_, options_);
+  EXPECT_NEAR(tilt.value, 0.12, 0.01);
+  EXPECT_TRUE(tilt.alternatives.empty());
+}
+
 /// Each in the words of the one who has to mend it.
 TEST_F(CheckJob, WordsSayWhatToDo) {
   const auto words = [&](Deviation deviation, double value) {
@@ -81,7 +93,7 @@ TEST_F(CheckJob, WordsSayWhatToDo) {
   EXPECT_THAT(words(Deviation::kTiltX, 0.1), HasSubstr("move its upper edge nearer"));
   EXPECT_THAT(words(Deviation::kPartTiltX, 0.1), HasSubstr("turn its lower edge towards the wall"));
   EXPECT_THAT(words(Deviation::kPartTiltY, 0.1), HasSubstr("turn its left edge towards the wall"));
-  EXPECT_THAT(words(Deviation::kBacklash, 0.02), HasSubstr("has 20.0 ± 2.0 µm of backlash: let"));
+  EXPECT_THAT(words(Deviation::kBacklash, 0.02), HasSubstr("has 20 ± 2 µm of backlash: let"));
   EXPECT_THAT(words(Deviation::kBacklash, -0.02), HasSubstr("let the controller compensate less"));
   EXPECT_THAT(words(Deviation::kLampDistance, 0.1), HasSubstr("instead of far away"));
   EXPECT_THAT(words(Deviation::kPolish, 0.3), HasSubstr("polish less"));

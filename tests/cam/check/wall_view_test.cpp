@@ -176,7 +176,7 @@ TEST(WallView, ADarkPhotographTakesTheRoomsLightAway) {
 }
 
 /// A barrel so strong that the picture's corners are nowhere in the photograph: steps towards them
-/// have no end, and the places that are asked for after them must be found all the same.
+/// have no end.
 TEST(WallView, AStronglyDistortedViewIsFollowedBack) {
   constexpr int kPlaces = 24;
   constexpr double kReach = 0.55;  // The fold is at 0.69.
@@ -184,7 +184,7 @@ TEST(WallView, AStronglyDistortedViewIsFollowedBack) {
   Eigen::VectorXd view = Eigen::VectorXd::Zero(view::kCount);
   view.head(8) << 2.2, 0.05, 0.1, -0.03, 2.2, 0.02, 0.15, -0.2;
   view.segment(view::kDistortion, 2) << -0.3, -0.5;
-  WallToPhoto seen(photo, view);
+  const WallToPhoto seen(photo, view);
   for (int k = 0; k < kPlaces * kPlaces; ++k) {
     const Eigen::Vector2d share((k % kPlaces + 0.5) / kPlaces - 0.5,
                                 (k / kPlaces + 0.5) / kPlaces - 0.5);
