@@ -529,7 +529,8 @@ TestedFit search(const TestedFit& from, int most) {
   }
   if (best.fit.active() != from.fit.active()) {
     for (const Deviation d : std::vector<Deviation>(best.fit.active())) {
-      if (auto other = with_other_tilt(best, d)) take(*std::move(other));
+      auto other = with_other_tilt(best, d);
+      if (other && other->fit.square() < best.fit.square()) take(*std::move(other));
     }
   }
   return best;
