@@ -67,11 +67,9 @@ double part_tilt_found(const Deviations& d, double) {
 
 double backlash_found(const Deviations& d, double) { return of(d, Deviation::kBacklash); }
 
-/// The first rows of causes(), of which pairs are made.
-constexpr std::size_t kInPairs = 7;
-
-const std::vector<Cause>& causes() {
-  static const std::vector<Cause> kCauses = {
+/// Of which pairs are made.
+std::vector<Cause> paired_causes() {
+  return {
       {"distance",
        "distance",
        {Deviation::kDistance},
@@ -120,6 +118,11 @@ const std::vector<Cause>& causes() {
        [](Fault& f, double a, double) { f.haze = drawn(0.12, a, 1.0); },
        [](const Fault& f) { return f.haze; },
        [](const Deviations& d, double) { return of(d, Deviation::kHaze); }},
+  };
+}
+
+std::vector<Cause> other_causes() {
+  return {
       {"part tilt",
        "part tilt",
        {Deviation::kPartTiltX, Deviation::kPartTiltY},
@@ -151,6 +154,14 @@ const std::vector<Cause>& causes() {
        [](const Fault& f) { return f.index; },
        [](const Deviations&, double) { return 0.0; }},
   };
+}
+
+const std::vector<Cause>& causes() {
+  static const std::vector<Cause> kCauses = [] {
+    std::vector<Cause> all = paired_causes();
+    for (const Cause& cause : other_causes()) all.push_back(cause);
+    return all;
+  }();
   return kCauses;
 }
 
@@ -307,7 +318,7 @@ void run_single(const Bench& bench, int each, const std::string& only, Draw& dra
 
 void run_pairs(const Bench& bench, int pairs, Draw& draw) {
   int both = 0;
-  const std::size_t count = kInPairs;
+  const std::size_t count = paired_causes().size();
   for (int k = 0; k < pairs; ++k) {
     const auto pair = static_cast<std::size_t>(k);
     const std::size_t one = pair % count;
