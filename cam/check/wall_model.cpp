@@ -67,9 +67,9 @@ Eigen::Vector2d middle_landing(const OpticalSetup& setup, double height) {
   return path.plane().to_mm(pixel) - setup.screen_centre().head<2>();
 }
 
-/// The light through a tilted part. Like every tilted plate it moves all light sideways, by some
-/// pixels, which no photograph shows: the picture's window goes with it, so that details keep their
-/// places.
+/// The light through a tilted part. Its surface lies above the place that it is turned about, which
+/// moves all light sideways by some pixels; no photograph shows that. The picture's window goes
+/// with it, so that details keep their places.
 OpticalSetup with_part_tilt(const OpticalSetup& straight, const Eigen::Vector2d& tilt,
                             double height) {
   OpticalSetup seen = seen_by_turned_part(straight, tilt);

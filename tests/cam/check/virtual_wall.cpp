@@ -42,7 +42,8 @@ OpticalSetup at_point(OpticalSetup setup, const Eigen::Vector2d& point) {
 }
 
 /// The part stays in its frame: lamp and wall turn about the lens's middle, in the opposite sense.
-void tilt_part(OpticalSetup& setup, const Fault& fault) {
+/// The window goes with the surface, which lies this much above that.
+void tilt_part(OpticalSetup& setup, const Fault& fault, double height) {
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(-fault.part_tilt_x, Eigen::Vector3d::UnitX()) *
                                 Eigen::AngleAxisd(-fault.part_tilt_y, Eigen::Vector3d::UnitY()))
                                    .toRotationMatrix();
@@ -56,6 +57,9 @@ void tilt_part(OpticalSetup& setup, const Fault& fault) {
   Eigen::Vector3d screen;
   screen << setup.image_origin + 0.5 * setup.image_size, setup.focal_length;
   screen = middle + turn * (screen - middle);
+  const Eigen::Vector3d way = turn * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d moved = height * Eigen::Vector3d::UnitZ();
+  screen += moved - moved.dot(way) * way;
   setup.image_origin = screen.head<2>() - 0.5 * setup.image_size;
   setup.focal_length = screen.z();
   setup.screen_x = turn * setup.screen_x;
@@ -63,7 +67,8 @@ void tilt_part(OpticalSetup& setup, const Fault& fault) {
 }
 
 /// The light on a wall that is farther and turned, wider than the picture.
-OpticalSetup seen_wall(const OpticalSetup& lens, const Fault& fault) {
+OpticalSetup seen_wall(const Lens& of, const Fault& fault) {
+  const OpticalSetup& lens = of.setup;
   OpticalSetup setup = lens;
   const Eigen::Vector2i more = (kMargin * setup.pixels.cast<double>()).array().round().cast<int>();
   const Eigen::Vector2d margin =
@@ -86,7 +91,8 @@ OpticalSetup seen_wall(const OpticalSetup& lens, const Fault& fault) {
                                    .toRotationMatrix();
   setup.screen_x = turn * setup.screen_x;
   setup.screen_y = turn * setup.screen_y;
-  if (fault.part_tilt_x != 0.0 || fault.part_tilt_y != 0.0) tilt_part(setup, fault);
+  if (fault.part_tilt_x != 0.0 || fault.part_tilt_y != 0.0)
+    tilt_part(setup, fault, of.surface.vertices.row(2).mean());
   return setup;
 }
 
@@ -201,7 +207,7 @@ std::vector<Workshop::LampPoint> Workshop::disc_points(double diameter) {
 
 WallLight Workshop::lit_by(const std::vector<LampPoint>& points, double spread,
                            const Fault& fault) const {
-  const OpticalSetup wall = seen_wall(lens_.setup, fault);
+  const OpticalSetup wall = seen_wall(lens_, fault);
   PolishModel polish = options_.workshop.polish;
   polish.sigma *= 1.0 + fault.sigma;
   const MilledField milled(paths(fault), setup_.blank.max().z());
@@ -235,7 +241,7 @@ WallLight Workshop::lit_by(const std::vector<LampPoint>& points, double spread,
 }
 
 WallLight Workshop::light(const Fault& fault) const {
-  const double width = seen_wall(lens_.setup, fault).extent.width * (1.0 + fault.lamp);
+  const double width = seen_wall(lens_, fault).extent.width * (1.0 + fault.lamp);
   if (width == 0.0) return lit_by({{{0.0, 0.0}, 1.0}}, 0.0, fault);
   return lit_by(disc_points(width), kPointWidth * width, fault);
 }
