@@ -186,8 +186,8 @@ TEST(WallView, AStronglyDistortedViewIsFollowedBack) {
   view.segment(view::kDistortion, 2) << -0.3, -0.5;
   const WallToPhoto seen(photo, view);
   for (int k = 0; k < kPlaces * kPlaces; ++k) {
-    const Eigen::Vector2d share((k % kPlaces + 0.5) / kPlaces - 0.5,
-                                (k / kPlaces + 0.5) / kPlaces - 0.5);
+    const Eigen::Vector2d cell(k % kPlaces, static_cast<int>(k / kPlaces));
+    const Eigen::Vector2d share = (cell.array() + 0.5) / kPlaces - 0.5;
     const Eigen::Vector2d beyond = seen.at(3.0 * share);
     ASSERT_TRUE(beyond.allFinite()) << share.transpose();
     EXPECT_LT(place_in(photo.light, beyond).norm(), 2.1) << share.transpose();
