@@ -173,7 +173,7 @@ void validate_face(const CamOptions& options, const OpticalSetup& setup) {
     throw InputError(joined({"--face front: the lens's front is ",
                              setup.front ? "a sphere, which its blank is bought or ground with"
                                          : "flat, as the blank's",
-                             "; only a front of --second or --front FILE is cut"}));
+                             "; only one of --faces two, --second or --front FILE is cut"}));
   }
   if (options.surface && *options.surface != SurfaceModel::kSpline) {
     throw InputError(joined({"--surface ", model_name(*options.surface),

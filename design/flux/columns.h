@@ -36,7 +36,7 @@ LF_HD LF_INLINE T every_third(const double* from, std::index_sequence<k...> /*la
 /// Columns i and following of a 3 × n array, as many as T has doubles.
 template <class T>
 LF_HD LF_INLINE SpaceVector<T> columns3(const double* data, std::int64_t i) {
-  constexpr auto kLanes = std::make_index_sequence<sizeof(T) / sizeof(double)>();
+  constexpr auto kLanes = std::make_index_sequence<sizeof(T) / 8>();  // Bytes of a double.
   const double* const from = data + 3 * i;
   return {every_third<T>(from, kLanes), every_third<T>(from + 1, kLanes),
           every_third<T>(from + 2, kLanes)};
