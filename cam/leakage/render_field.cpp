@@ -199,6 +199,7 @@ std::vector<HeightFront> height_maps(std::span<const SurfaceField* const> fields
   const Eigen::Vector2d size = grid.spacing.cwiseProduct(
       Eigen::Vector2d(static_cast<double>(grid.columns - 1), static_cast<double>(grid.rows - 1)));
   std::vector<HeightFront> fronts;
+  fronts.reserve(heights.size());
   for (HeightGrid& one : heights) {
     fronts.push_back({std::make_shared<const HeightSpline>(std::move(one)), size, grid.origin});
   }

@@ -349,8 +349,9 @@ void require_front(const DesignOptions& o, const Eigen::Vector2i& pixels) {
                             : file             ? "--front " + o.light.front_file
                                                : front_text(*o.light.front_radius);
   if (!traits(o.light.body).transmits) {
-    refuse(given,
-           std::string("is of a lens; leave it out with --mode ") + traits(o.light.body).mode);
+    const char* const usual = o.light.both_faces ? "--faces one" : "--front flat";
+    refuse(given, std::string("is of a lens; ") + usual + " works with --mode " +
+                      traits(o.light.body).mode);
   }
   if (o.light.front_radius) return require_sphere(o, pixels, *o.light.front_radius);
   if (o.light.both_faces && !o.light.front_heights) return;
