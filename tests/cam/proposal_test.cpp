@@ -83,17 +83,17 @@ TEST(Proposal, HoursLimitTheWidth) {
 TEST(Proposal, ATrialIsLitAsTheLensIs) {
   ProposalWish wish;
   wish.sized = wish.pixelled = true;
-  wish.design.width = 40.0;
-  wish.design.focal_length = 120.0;
+  wish.design.width = 10.0;
+  wish.design.focal_length = 40.0;
   wish.design.pixels = 128;
   wish.design.rounds = 1;  // Both are the same whatever the trial's quality.
   wish.design.light.source = SourceKind::kPoint;
-  wish.design.light.source_distance = 100.0;
+  wish.design.light.source_distance = 30.0;
   const Image picture = disc(128);
   const Executor executor = Executor::cpu();
   const double expected = propose(picture, wish, executor, {}).front().forecast.relief;
   wish.design.light.source_distance = 0.0;
-  wish.design.light.source_position = Eigen::Vector3d(20.0, 20.0, -100.0);
+  wish.design.light.source_position = Eigen::Vector3d(5.0, 5.0, -30.0);
   EXPECT_DOUBLE_EQ(propose(picture, wish, executor, {}).front().forecast.relief, expected);
 }
 
