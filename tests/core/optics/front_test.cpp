@@ -46,7 +46,9 @@ TEST(HeightFront, GoesThroughItsSamplesTheTopRowAtTheGreatestY) {
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 5; ++column) {
       const Eigen::Vector2d at(kSize.x() * column / 4.0, kSize.y() * (3 - row) / 3.0);
-      const double sample = double{grid.heights[static_cast<std::size_t>(5 * row + column)]};
+      const std::size_t number =
+          5 * static_cast<std::size_t>(row) + static_cast<std::size_t>(column);
+      const double sample = double{grid.heights[number]};
       EXPECT_NEAR(front.height(at), sample, 1e-14);
     }
   }
