@@ -303,10 +303,10 @@ std::string two_setup_words(const CutSetup& setup) {
                  "whole face, and its top, the frame that stays around the front, becomes what it ",
                  "lies on. Zero X and Y on the blank's left edge, X ", left,
                  ", and its lower edge, Y ", left, ", and mark both. The blank is ", high,
-                 " high. Then polish the front and turn the blank over about the axis along Y: "
-                 "its left edge comes to the right, X ",
-                 right, ", its lower edge stays at Y ", left, ". It lies on ", support_words(setup),
-                 ". Cut the back with lensforge cam ", setup.options.job,
+                 " high. Then polish the front and turn the blank over about the axis along Y: ",
+                 "its left edge comes to the right, X ", right, ", its lower edge stays at Y ",
+                 left, ". It lies on ", support_words(setup), ". Cut the back with lensforge cam ",
+                 setup.options.job,
                  " --z-zero table and the other options as now, Z 0 on the table"});
 }
 
