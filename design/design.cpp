@@ -278,6 +278,8 @@ DesignOptions with_half_turn(DesignOptions options, const Eigen::Vector2d& size)
     light.source_distance = 0.0;
   }
   light.source_angle = light.source_size = 0.0;
+  light.source_picture.clear();
+  light.source_shape = {};
   light.spectrum = {};
   light.model = LightModel::kRays;
   options.focal_length += options.focal_length - options.thickness;

@@ -9,13 +9,13 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
-#include <numbers>
 #include <utility>
 #include <variant>
 
 #include "cam/leakage/render_field.h"
 #include "cam/tolerance/part_error.h"
 #include "cam/tolerance/part_model.h"
+#include "core/compute/scalar.h"
 #include "core/error.h"
 #include "core/lens/lens.h"
 #include "core/lens/surface_field.h"
@@ -220,8 +220,6 @@ namespace {
 /// Rays per pixel of an even picture each way, for the pictures of smooth faces.
 constexpr double kRaysPerPixel = 6.0;
 
-constexpr double kRadians = std::numbers::pi / 180.0;
-
 /// A displacement of the front, in the directions of FaceError.
 struct FaceMove {
   Eigen::Vector2d shift{0.0, 0.0};  ///< mm
@@ -268,8 +266,8 @@ struct NamedMove {
 };
 
 std::vector<NamedMove> moves_of(const Tolerances& t) {
-  const double turn = kRadians * t.face_turn_deg;
-  const double tilt = kRadians * t.face_tilt_deg;
+  const double turn = kDegree * t.face_turn_deg;
+  const double tilt = kDegree * t.face_tilt_deg;
   return {{"shift along x", t.face_shift, "mm", {.shift = {t.face_shift, 0.0}}},
           {"shift along y", t.face_shift, "mm", {.shift = {0.0, t.face_shift}}},
           {"turn about z", t.face_turn_deg, "°", {.turn = turn}},

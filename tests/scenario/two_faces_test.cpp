@@ -134,6 +134,12 @@ TEST_F(TwoFaces, ShareTheSlopesOfOnePicture) {
   }
 }
 
+TEST_F(TwoFaces, ShapeTheFrontWithoutTheLampsExtent) {
+  const Outcome made = run(one_picture(
+      "two", path("lens"), {"--source-angle", "2", "--source-picture", picture("rings.png")}));
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+}
+
 TEST_F(TwoFaces, WhatBothForOnePictureCannotHaveIsRefusedInOneLine) {
   const std::pair<Arguments, std::vector<std::string>> faults[] = {
       {{"--front", "sphere:100"}, {"--faces two", "leave out --front"}},
