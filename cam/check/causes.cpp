@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <iterator>
@@ -85,7 +86,9 @@ class DeviationFit {
   [[nodiscard]] const Eigen::VectorXd& view() const { return view_; }
   [[nodiscard]] const Deviations& deviations() const { return at_; }
   [[nodiscard]] const std::vector<Deviation>& active() const { return active_; }
-  [[nodiscard]] double square() const { return square_; }
+  [[nodiscard]] double square() const { return left_.squaredNorm(); }
+  /// What the fit leaves.
+  [[nodiscard]] const Eigen::VectorXd& left() const { return left_; }
   [[nodiscard]] double samples() const { return static_cast<double>(pixels_->size()); }
 
   /// These may differ from 0; the others no longer do.
@@ -147,7 +150,7 @@ class DeviationFit {
   Eigen::VectorXd view_;
   Deviations at_;
   std::vector<Deviation> active_;
-  double square_ = 0.0;
+  Eigen::VectorXd left_;
 };
 
 WallPicture DeviationFit::change(Deviation deviation, const WallPicture& from) const {
@@ -219,7 +222,7 @@ void DeviationFit::run() {
     start.head(view::kCount) = view_;
     if (take(minimize(problem(line), start)) < kShortStep) break;
   }
-  square_ = (pixels_->shown(view_, wall(at_)) - pixels_->seen()).squaredNorm();
+  left_ = pixels_->shown(view_, wall(at_)) - pixels_->seen();
 }
 
 bool DeviationFit::shows(Deviation deviation, Standing standing) const {
@@ -329,6 +332,22 @@ class JointTest {
 
   [[nodiscard]] const std::vector<Deviation>& showing() const { return showing_; }
 
+  /// True for deviations that show and that tables of photographs on a virtual wall prove
+  /// (docs/check.md). The others may stand in their place, or be measured.
+  [[nodiscard]] bool may_be_named(Deviation deviation) const {
+    if (std::find(showing_.begin(), showing_.end(), deviation) == showing_.end()) return false;
+    switch (deviation) {
+      case Deviation::kIndex:
+        return false;
+      case Deviation::kLampDistance:
+        return chart_;
+      case Deviation::kBall:
+        return ball_shows() > kBallShows;
+      default:
+        return true;
+    }
+  }
+
   /// By how much a photograph is likelier, in ln likelihood times 2, with a set of causes than with
   /// none, less their cost; infinitely less for sets that are not named.
   [[nodiscard]] double evidence(const std::vector<Deviation>& causes) const {
@@ -402,21 +421,6 @@ class JointTest {
     return result;
   }
 
-  /// True for deviations that tables of photographs on a virtual wall prove (docs/check.md). The
-  /// others may stand in their place, or be measured.
-  [[nodiscard]] bool may_be_named(Deviation deviation) const {
-    switch (deviation) {
-      case Deviation::kIndex:
-        return false;
-      case Deviation::kLampDistance:
-        return chart_;
-      case Deviation::kBall:
-        return ball_shows() > kBallShows;
-      default:
-        return true;
-    }
-  }
-
   /// Change of display values, rms, by a ball that is 10 % larger.
   [[nodiscard]] double ball_shows() const {
     constexpr double kLarger = 0.1;
@@ -466,9 +470,16 @@ WallPicture wall_picture(const WallModel& model, const Deviations& deviations) {
 
 namespace {
 
-/// Where a search for a weaker polish begins: scallops that it leaves show suddenly, so that
-/// nothing of them is in the derivatives around the forecast.
-constexpr double kWeakerPolish = -0.35;
+/// A cause alone, and a value of it where a search for it begins besides the forecast.
+struct DistantStart {
+  Deviation cause;
+  double value;
+};
+/// Scallops that a weaker polish leaves show suddenly, so that nothing of them is in the
+/// derivatives around the forecast; where they show, those of a ball that is a sixth off have
+/// little in common with what the derivatives tell.
+constexpr std::array<DistantStart, 3> kDistantStarts{
+    {{Deviation::kPolish, -0.35}, {Deviation::kBall, -0.15}, {Deviation::kBall, 0.15}}};
 
 /// A fit and what speaks for and against its causes.
 struct TestedFit {
@@ -492,11 +503,16 @@ struct TestedFit {
   }
 };
 
-/// The same view with these causes, fitted. @param polish  where the search for it begins, if it is
-/// among them and was not active.
-TestedFit with_causes(DeviationFit fit, const std::vector<Deviation>& causes, double polish = 0.0) {
+/// The same view with these causes, fitted.
+TestedFit with_causes(DeviationFit fit, const std::vector<Deviation>& causes) {
   fit.activate(causes);
-  if (polish != 0.0) fit.start(Deviation::kPolish, polish);
+  fit.run();
+  return TestedFit(std::move(fit));
+}
+
+TestedFit with_cause_from(DeviationFit fit, const DistantStart& start) {
+  fit.activate({start.cause});
+  fit.start(start.cause, start.value);
   fit.run();
   return TestedFit(std::move(fit));
 }
@@ -523,9 +539,8 @@ TestedFit search(const TestedFit& from, int most) {
   for (const std::vector<Deviation>& causes : from.test.best(most)) {
     if (causes != from.fit.active()) take(with_causes(from.fit, causes));
   }
-  const std::vector<Deviation>& showing = from.test.showing();
-  if (most == 1 && std::find(showing.begin(), showing.end(), Deviation::kPolish) != showing.end()) {
-    take(with_causes(from.fit, {Deviation::kPolish}, kWeakerPolish));
+  for (const DistantStart& start : kDistantStarts) {
+    if (most == 1 && from.test.may_be_named(start.cause)) take(with_cause_from(from.fit, start));
   }
   if (best.fit.active() != from.fit.active()) {
     for (const Deviation d : std::vector<Deviation>(best.fit.active())) {
@@ -594,6 +609,7 @@ CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eig
   result.view = fit.view();
   result.deviations = fit.deviations();
   result.residual = std::sqrt(fit.square() / fit.samples());
+  result.systematic = tied.shared_by_neighbours(fit.left());
   return result;
 }
 

@@ -31,6 +31,7 @@ struct CauseFit {
   /// does not show.
   Deviations alone = Deviations::Zero(), errors = Deviations::Zero();
   double residual = 0.0;     ///< Root mean square of display values.
+  double systematic = 0.0;   ///< Its part that neighbouring pixels share, which is no noise.
   double unexplained = 0.0;  ///< The same without any cause.
 };
 

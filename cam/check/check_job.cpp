@@ -379,11 +379,18 @@ std::string words_of(const ChartFinding& chart, const Lens& lens) {
 
 std::string verdict_of(const CheckResult& result, const Lens& lens, const CamOptions& options) {
   const std::string chart = result.chart ? "; " + words_of(*result.chart, lens) : "";
+  const bool explained = result.fit.systematic <= kMostSystematic;
+  const std::string left = decimal_text(result.fit.systematic, 4) + " of display values (rms)";
   if (result.fit.found.empty()) {
-    return "Nothing is wrong that shows in this photograph" + chart;
+    return (explained ? "Nothing is wrong that shows in this photograph"
+                      : "Something is wrong that no cause explains: " + left +
+                            " differ from the forecast beyond noise") +
+           chart;
   }
   const FoundCause& first = result.fit.found.front();
-  return "Likeliest: " + words_of(first, lens, options) + alternatives_words(first) + chart;
+  return "Likeliest: " + words_of(first, lens, options) + alternatives_words(first) +
+         (explained ? "" : "; that does not explain all, " + left + " still differ beyond noise") +
+         chart;
 }
 
 namespace {
@@ -464,6 +471,7 @@ nlohmann::json check_json(const CheckResult& result, const Lens& lens, const Cam
           {"next", next_json(result.next)},
           {"forecast_of", result.part ? "part" : "design"},
           {"residual", result.fit.residual},
+          {"residual_systematic", result.fit.systematic},
           {"residual_without_causes", result.fit.unexplained},
           {"pixels_across", result.seen_pixels},
           {"clipped_share", result.unusable},
@@ -539,9 +547,10 @@ std::string report_page(const CheckResult& result, const Lens& lens, const CamOp
   const std::array<NamedText, 5> facts{{
       {"MAE against the target", likeness_row(result.to_target)},
       {"MAE against the forecast", likeness_row(result.to_forecast)},
-      {"Left unexplained, rms of display values", decimal_text(result.fit.residual, 4) +
-                                                      ", without causes " +
-                                                      decimal_text(result.fit.unexplained, 4)},
+      {"Left unexplained, rms of display values",
+       decimal_text(result.fit.residual, 4) + ", beyond noise " +
+           decimal_text(result.fit.systematic, 4) + "; without causes " +
+           decimal_text(result.fit.unexplained, 4)},
       {"Photograph", decimal_text(result.seen_pixels, 0) + " pixels across the picture, " +
                          percent_text(result.unusable) + " clipped"},
       {"Chart on the wall", chart},

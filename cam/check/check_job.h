@@ -89,7 +89,10 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options, const 
 std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions& options);
 /// "by the chart the picture is 104.1 ± 0.2 mm wide, planned 100 mm"
 std::string words_of(const ChartFinding& chart, const Lens& lens);
-/// What is wrong, in a sentence: that of the likeliest cause, or that nothing shows.
+/// CauseFit::systematic up to which a photograph counts as explained: TODO.
+inline constexpr double kMostSystematic = 0.003;
+/// What is wrong, in a sentence: that of the likeliest cause, or that nothing shows; and whether
+/// that explains the photograph.
 std::string verdict_of(const CheckResult& result, const Lens& lens, const CamOptions& options);
 
 /// The content of check.json.

@@ -413,20 +413,31 @@ double SeenPixels::correlation(const Eigen::VectorXd& view, const WallPicture& w
   return length > 0.0 ? (a * b).sum() / length : 0.0;
 }
 
-double SeenPixels::values_alike(const Eigen::VectorXd& residuals) const {
-  constexpr double kMost = 0.9;
-  double product = 0.0;
-  double square = 0.0;
+SeenPixels::NeighbourMeans SeenPixels::neighbour_means(const Eigen::VectorXd& residuals) const {
+  NeighbourMeans means;
+  double count = 0.0;
   for (std::size_t i = 1; i < places_.size(); ++i) {
     const Eigen::Vector2d way = (places_[i] - places_[i - 1]) / pixel_;
     if ((way - Eigen::Vector2d::UnitX()).norm() > 0.5) continue;
     const double left = residuals[static_cast<Eigen::Index>(i) - 1];
     const double right = residuals[static_cast<Eigen::Index>(i)];
-    product += left * right;
-    square += 0.5 * (left * left + right * right);
+    count += 1.0;
+    means.product += (left * right - means.product) / count;
+    means.square += (0.5 * (left * left + right * right) - means.square) / count;
   }
-  const double rho = square > 0.0 ? std::clamp(product / square, 0.0, kMost) : 0.0;
+  return means;
+}
+
+double SeenPixels::values_alike(const Eigen::VectorXd& residuals) const {
+  constexpr double kMost = 0.9;
+  const NeighbourMeans means = neighbour_means(residuals);
+  const double rho =
+      means.square > 0.0 ? std::clamp(means.product / means.square, 0.0, kMost) : 0.0;
   return std::pow((1.0 + rho) / (1.0 - rho), 2);
+}
+
+double SeenPixels::shared_by_neighbours(const Eigen::VectorXd& residuals) const {
+  return std::sqrt(std::max(neighbour_means(residuals).product, 0.0));
 }
 
 LeastSquares view_problem() {

@@ -160,8 +160,17 @@ class SeenPixels {
   /// Pixels per independent value of residuals: ((1 + ρ) / (1 − ρ))², ρ their correlation from a
   /// pixel to its right neighbour, as of a first-order process along both axes; at least 1.
   [[nodiscard]] double values_alike(const Eigen::VectorXd& residuals) const;
+  /// Root mean square of what a pixel's residual shares with its right neighbour's: the part that
+  /// is no noise of the pixels.
+  [[nodiscard]] double shared_by_neighbours(const Eigen::VectorXd& residuals) const;
 
  private:
+  /// Means over neighbours along a row.
+  struct NeighbourMeans {
+    double product = 0.0;
+    double square = 0.0;
+  };
+  [[nodiscard]] NeighbourMeans neighbour_means(const Eigen::VectorXd& residuals) const;
   [[nodiscard]] WallPicture::Light seen_light(const Eigen::VectorXd& view, const WallPicture& wall,
                                               const Eigen::Vector2d& place) const;
   /// Places on the wall whose mean stands for a pixel.

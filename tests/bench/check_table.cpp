@@ -218,7 +218,8 @@ class Bench {
               << number_text(camera.pitch, 2) << ", ambient " << number_text(camera.ambient, 2)
               << ", white " << number_text(camera.white, 3) << "), "
               << number_text(pixels_across(photo, view), 3) << " pixels, rms " << fit.unexplained
-              << " to " << fit.residual << ", " << number_text(seconds, 2) << " s of a processor\n";
+              << " to " << fit.residual << ", systematic " << fit.systematic << ", "
+              << number_text(seconds, 2) << " s of a processor\n";
     for (const FoundCause& f : fit.found) {
       std::cerr << "  found " << name_of(f.deviation) << " (" << index_of(f.deviation) << ") "
                 << f.value << " ± " << f.error << ", evidence " << number_text(f.evidence, 3);

@@ -79,6 +79,29 @@ TEST_F(CheckJob, TellsTheTiltOfThePartFromTheWalls) {
   EXPECT_TRUE(tilt.alternatives.empty());
 }
 
+/// A ball so far off that its scallops have little in common with what the derivatives tell.
+TEST_F(CheckJob, NamesABallThatIsFarOffWhereScallopsShow) {
+  options_.workshop.process.finish.pitch = 0.12;
+  Fault fault;
+  fault.ball = 0.2;
+  const CheckResult result = check(fault, 4);
+  ASSERT_EQ(result.fit.found.size(), 1U) << verdict_of(result, lens_, options_);
+  EXPECT_EQ(result.fit.found.front().deviation, Deviation::kBall);
+  EXPECT_NEAR(result.fit.found.front().value, 0.2, 0.006);
+  EXPECT_LT(result.fit.systematic, kMostSystematic);
+}
+
+TEST_F(CheckJob, TellsWhereNoCauseExplainsWhatIsSeen) {
+  CheckResult result;
+  result.fit.systematic = 0.9 * kMostSystematic;
+  EXPECT_EQ(verdict_of(result, lens_, options_), "Nothing is wrong that shows in this photograph");
+  result.fit.systematic = 0.0333;
+  EXPECT_THAT(verdict_of(result, lens_, options_), HasSubstr("no cause explains: 0.0333 of"));
+  result.fit.found = {{Deviation::kDistance, 0.05, 0.005, 100.0, {}}};
+  EXPECT_THAT(verdict_of(result, lens_, options_),
+              HasSubstr("move it nearer; that does not explain all, 0.0333 of"));
+}
+
 /// Each in the words of the one who has to mend it.
 TEST_F(CheckJob, WordsSayWhatToDo) {
   const auto words = [&](Deviation deviation, double value) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -93,6 +94,20 @@ TEST(WallView, DerivativesAreThoseOfDifferences) {
     // Of light by the pixel's middle: some hundredths.
     EXPECT_LT((known.col(k) - change).norm(), 0.03 * change.norm()) << k;
   }
+}
+
+/// Noise of pixels is not shared, what the model misses is.
+TEST(WallView, ToldApartFromNoiseByNeighbours) {
+  const WallPicture wall = spots();
+  const Photograph photo = shot(wall, virtual_wall::Camera{});
+  const SeenPixels pixels(photo, find_picture(photo, wall), 0.9);
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal(0.0, 0.01);
+  Eigen::VectorXd noise(pixels.size());
+  for (double& value : noise) value = normal(random);
+  EXPECT_LT(pixels.shared_by_neighbours(noise), 0.0015);
+  const Eigen::VectorXd missed = Eigen::VectorXd::Constant(pixels.size(), 0.006) + noise;
+  EXPECT_NEAR(pixels.shared_by_neighbours(missed), 0.006, 6e-4);
 }
 
 /// From any side up to 30°, distorted, vignetted, in a lit room.
