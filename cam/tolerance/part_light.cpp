@@ -54,9 +54,10 @@ OpticalSetup seen_by_part(const OpticalSetup& setup, const PartError& error) {
   return error.tilt.isZero() ? seen : seen_by_turned_part(seen, error.tilt);
 }
 
-/// True for parallel light along a lens's axis onto a screen parallel to it.
+/// True for parallel light along a lens's axis, through a flat front, onto a screen parallel to it.
 bool is_straight(const OpticalSetup& setup) {
-  return traits(setup.body).transmits && setup.lamp == Lamp() && !setup.screen_is_turned();
+  return traits(setup.body).transmits && setup.lamp == Lamp() && !setup.front &&
+         !setup.screen_is_turned();
 }
 
 }  // namespace

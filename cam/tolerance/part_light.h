@@ -26,7 +26,8 @@ struct PartNodes {
 
 /// Light path to the screen through a part with errors: turned about its centre, with another
 /// refractive index, grown, and with the screen farther away along its own axis. Lamp and screen
-/// stay in place.
+/// stay in place. A curved front turns with the part but does not grow: of 10 K that is some
+/// 0.01 mm aside at the rim of a lens of 25 mm.
 class PartLight {
  public:
   PartLight(const OpticalSetup& setup, const PartError& error);

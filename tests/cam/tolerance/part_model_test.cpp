@@ -23,6 +23,7 @@
 #include "cam/predict/part_surfaces.h"
 #include "core/error.h"
 #include "core/lens/surface_field.h"
+#include "core/optics/height_fronts.h"
 #include "core/optics/light_path.h"
 
 namespace lensforge::part_model_test {
@@ -232,14 +233,34 @@ OpticalSetup tilted_setup() {
   return optics;
 }
 
+/// Within the fronts light is bent by up to 0.02 rad.
+OpticalSetup sphere_setup() {
+  OpticalSetup optics = setup();
+  optics.front = SphericalFront{60.0, {2.3, 2.6, -0.5}};
+  optics.image_size = {3.6, 3.6};
+  optics.image_origin = {0.5, 0.8};
+  return optics;
+}
+
+OpticalSetup height_setup() {
+  OpticalSetup optics = setup();
+  optics.front = testing::height_front(optics.lens_size, {40, 40}, [](const Eigen::Vector2d& at) {
+    return -1.0 + 0.03 * std::sin(1.1 * at.x()) * std::cos(0.9 * at.y());
+  });
+  return optics;
+}
+
 /// The figures of a part without errors and of one before a screen that is farther, by a model that
 /// is made for this light, are the chain's.
 TEST_F(PartModelTest, UnderOtherLightAPartIsThatOfTheChain) {
   const SurfaceMesh mesh = testing::grid_mesh(51, 51, kSide, kSide, relief);
-  const std::array<std::pair<const char*, OpticalSetup>, 4> lights{{{"mirror", mirror_setup()},
-                                                                    {"point", point_setup()},
-                                                                    {"disc", disc_setup()},
-                                                                    {"tilted", tilted_setup()}}};
+  const std::array<std::pair<const char*, OpticalSetup>, 6> lights{
+      {{"mirror", mirror_setup()},
+       {"point", point_setup()},
+       {"disc", disc_setup()},
+       {"tilted", tilted_setup()},
+       {"behind a sphere", sphere_setup()},
+       {"behind a height map", height_setup()}}};
   for (const auto& [name, optics] : lights) {
     SCOPED_TRACE(name);
     const auto render = [&](const SurfaceField& field, const OpticalSetup& by) {
