@@ -70,12 +70,13 @@ PartLight::PartLight(const OpticalSetup& setup, const PartError& error)
       straight_(is_straight(setup)),
       screen_(setup.focal_length + error.distance) {}
 
-Eigen::Vector2d PartLight::land(const Eigen::Vector3d& point, const Eigen::Vector2d& slope) const {
+Eigen::Vector2d PartLight::land(const Eigen::Vector3d& point, const Eigen::Vector2d& slope,
+                                const IncidentRay* known) const {
   const Eigen::Vector3d n = Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
-  if (!light_.transmits(point, n)) {
+  if (!light_.transmits(point, n, known)) {
     return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
-  return light_.land(point, light_.beam(point, n).m);
+  return light_.land(point, light_.beam(point, n, known).m);
 }
 
 double PartLight::whole(const PartNodes& nodes) const {

@@ -36,11 +36,20 @@ class PartLight {
   [[nodiscard]] Eigen::Vector3d grown(const Eigen::Vector2d& place, double z) const {
     return centre_ + growth_ * (Eigen::Vector3d(place.x(), place.y(), z) - centre_);
   }
+  /// True if rays differ from point to point and have to be solved for.
+  [[nodiscard]] bool varies() const { return light_.varies(); }
+  /// The ray to such a point. @pre varies().
+  [[nodiscard]] IncidentRay ray_to(const Eigen::Vector3d& point) const {
+    return light_.ray_to(point);
+  }
   /// Landing place of the ray from such a point, in pixel coordinates; NaN if it misses the screen.
-  [[nodiscard]] Eigen::Vector2d land(const Eigen::Vector3d& point,
-                                     const Eigen::Vector2d& slope) const;
+  /// @param known  ray_to(point), if at hand.
+  [[nodiscard]] Eigen::Vector2d land(const Eigen::Vector3d& point, const Eigen::Vector2d& slope,
+                                     const IncidentRay* known = nullptr) const;
   /// Light on a triangle of such points, mm² (LightPath::intake()).
-  [[nodiscard]] double intake(const Corners& triangle) const { return light_.intake(triangle); }
+  [[nodiscard]] double intake(const Corners& triangle, const CornerRays& known = {}) const {
+    return light_.intake(triangle, known);
+  }
   /// Light on the whole part, mm²: for light along a lens's axis its grown area, else the light
   /// through the triangles between its nodes. That hardly depends on their number: the light
   /// through the part follows from its rim.

@@ -316,6 +316,9 @@ class PartTile {
   [[nodiscard]] std::size_t index(std::int64_t i, std::int64_t j) const {
     return static_cast<std::size_t>(j * x_.count + i);
   }
+  [[nodiscard]] const IncidentRay* ray_to(std::size_t node) const {
+    return rays_.empty() ? nullptr : &rays_[node];
+  }
   [[nodiscard]] double flux_of(std::size_t a, std::size_t b, std::size_t c) const;
 
   const PartScene& scene_;
@@ -323,6 +326,7 @@ class PartTile {
   Nodes x_, y_;
   std::vector<double> z_, slope_x_, slope_y_;
   std::vector<Eigen::Vector3d> points_;
+  std::vector<IncidentRay> rays_;  ///< To the points; empty if all are alike.
   std::vector<Eigen::Vector2d> landing_;
   std::array<Eigen::Vector2d, 2> steps_{};  ///< ripple_step() of axes with fine parts.
 };
@@ -488,7 +492,9 @@ void PartTile::land() {
     for (std::int64_t i = 0; i < x_.count; ++i) {
       const std::size_t n = index(i, j);
       points_[n] = scene_.light.grown(place(i, j), z_[n]);
-      landing_[n] = scene_.light.land(points_[n], {slope_x_[n], slope_y_[n]}) + margin;
+      if (scene_.light.varies()) rays_.push_back(scene_.light.ray_to(points_[n]));
+      const Eigen::Vector2d slope(slope_x_[n], slope_y_[n]);
+      landing_[n] = scene_.light.land(points_[n], slope, ray_to(n)) + margin;
     }
   }
 }
@@ -540,7 +546,8 @@ double PartTile::seen_by_source(int axis) const {
 }
 
 double PartTile::flux_of(std::size_t a, std::size_t b, std::size_t c) const {
-  return scene_.light.intake({points_[a], points_[b], points_[c]}) / scene_.whole;
+  const CornerRays rays{ray_to(a), ray_to(b), ray_to(c)};
+  return scene_.light.intake({points_[a], points_[b], points_[c]}, rays) / scene_.whole;
 }
 
 /// Where light lands between nodes.
