@@ -233,6 +233,7 @@ void describe(Description& d, CheckSettings& settings) {
          "photograph that shows it gives perspective and size for certain");
   d.length("--chart-bar", settings.chart_bar, Limits::between(1.0, 1000.0),
            "length of the chart's scale bar: to draw, or as measured on the print");
+  describe_light(d, settings.cam, "the forecast");
   describe(d, settings.lamp);
   d.flag("--force", settings.force, "replace files that lensforge did not write");
 }

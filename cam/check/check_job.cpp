@@ -171,6 +171,7 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options,
   const Eigen::VectorXd found = find_picture(photo, forecast);
   CheckResult result;
   result.part = model.has_part();
+  result.by_waves = model.by_waves();
   result.fault = model.fault();
   result.seen_pixels = pixels_across(photo, found);
   const Photograph less =
@@ -470,6 +471,7 @@ nlohmann::json check_json(const CheckResult& result, const Lens& lens, const Cam
           {"chart", chart_json(result, lens)},
           {"next", next_json(result.next)},
           {"forecast_of", result.part ? "part" : "design"},
+          {"light_model", result.by_waves ? "waves" : "rays"},
           {"residual", result.fit.residual},
           {"residual_systematic", result.fit.systematic},
           {"residual_without_causes", result.fit.unexplained},

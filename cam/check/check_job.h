@@ -72,9 +72,10 @@ struct CheckResult {
   Image forecast;
   Likeness to_target, to_forecast;
   CauseFit fit;
-  NextLens next;      ///< By `fit`.
-  bool part = false;  ///< The forecast is the part's; else the design's.
-  std::string fault;  ///< Why it is not.
+  NextLens next;          ///< By `fit`.
+  bool part = false;      ///< The forecast is the part's; else the design's.
+  bool by_waves = false;  ///< Diffraction is in it.
+  std::string fault;      ///< Why it is not.
   std::optional<ChartFinding> chart;
   double seen_pixels = 0.0;  ///< Of the photograph, across the picture.
   double unusable = 0.0;     ///< Share of the picture that is clipped.
@@ -89,7 +90,8 @@ CheckResult check_photograph(const Lens& lens, const CamOptions& options, const 
 std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions& options);
 /// "by the chart the picture is 104.1 ± 0.2 mm wide, planned 100 mm"
 std::string words_of(const ChartFinding& chart, const Lens& lens);
-/// CauseFit::systematic up to which a photograph counts as explained: TODO.
+/// CauseFit::systematic up to which a photograph counts as explained: twice the most that one fault
+/// left on the virtual wall (docs/check.md).
 inline constexpr double kMostSystematic = 0.003;
 /// What is wrong, in a sentence: that of the likeliest cause, or that nothing shows; and whether
 /// that explains the photograph.

@@ -13,12 +13,15 @@
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/plan/finishing.h"
+#include "cam/predict/prediction.h"
 #include "cam/tolerance/part_light.h"
 #include "core/error.h"
 #include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
 #include "core/optics/polish_transfer.h"
 #include "design/render.h"
+#include "design/render/source_picture.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge {
 namespace {
@@ -178,9 +181,23 @@ struct WallModel::Part {
   std::shared_ptr<const Cut> cut;
   PolishedField polished;
   HeldField held;
+  /// What waves add to its shares of light, lit from a point; empty: by rays.
+  std::vector<double> diffraction;
 };
 
 WallModel::~WallModel() = default;
+
+namespace {
+
+/// Why there are no parts.
+std::string fault_of(const Lens& lens, const CamOptions& options) {
+  std::string fault = tolerance_fault(options, lens.setup);
+  const bool creased = options.surface.value_or(lens.model) == SurfaceModel::kFacet;
+  if (fault.empty() && creased) fault = "draws parts of surfaces without creases only";
+  return fault;
+}
+
+}  // namespace
 
 WallModel::WallModel(const Lens& lens, const CamOptions& options, int fine,
                      const Executor& executor, const RunControl& control)
@@ -190,20 +207,22 @@ WallModel::WallModel(const Lens& lens, const CamOptions& options, int fine,
       margin_(static_cast<int>(std::lround(kMargin * lens.setup.pixels.maxCoeff()))),
       wide_(widened(lens.setup, fine, margin_)),
       height_(mean_height(lens)),
-      fault_(tolerance_fault(options, lens.setup)),
-      executor_(executor) {
+      fault_(fault_of(lens, options)),
+      executor_(executor),
+      silent_(control.stop_token(), {}) {
   const std::int64_t pixels = wide_.pixels.cast<std::int64_t>().prod();
   lights_.most = kept(kKeptPixels / 2, pixels, 2);
   pictures_.most = kept(kKeptPixels, pixels, 4);
-  if (!fault_.empty()) return;
-  if (options.surface.value_or(lens.model) == SurfaceModel::kFacet) {
-    fault_ = "draws parts of surfaces without creases only";
-    return;
+  if (!fault_.empty()) {
+    if (options.light != LightModel::kWaves) return;
+    throw InputError("--light-model waves: check " + fault_ +
+                     ", and the light of other lenses goes by rays; use auto or rays");
   }
   plan_rows(cut_setup(lens, options), control);
   grid_ = lens_grid(wide_.lens_size, sample_spacings(options_, lens_.setup, passes_));
   cuts_.most = kept(kKeptNodes, grid_.size(), 2);
   parts_.most = kept(kKeptNodes, grid_.size(), 2);
+  choose_light();
 }
 
 /// The path's decimals are left out: they move light by less than the fit of its moves.
@@ -273,8 +292,11 @@ std::shared_ptr<const WallModel::Part> WallModel::part(const Deviations& deviati
       deviations[index_of(Deviation::kBall)],
       options_.workshop.process.finish.pitch_error + deviations[index_of(Deviation::kPitch)],
       deviations[index_of(Deviation::kBacklash)]};
-  return parts_.of({polish.sigma, made},
-                   [&] { return std::make_shared<const Part>(cut(made), polish, *this); });
+  return parts_.of({polish.sigma, made}, [&] {
+    auto result = std::make_shared<Part>(cut(made), polish, *this);
+    if (by_waves()) result->diffraction = diffraction_of(*result);
+    return result;
+  });
 }
 
 std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& optics) const {
@@ -285,7 +307,27 @@ std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& op
     if (!path.intake_is_plan_area()) render.whole.push_back(intake_of(lens_.surface, path));
   }
   if (is_kept_whole()) render.tile = std::max(grid_.columns, grid_.rows);
-  return render_field(part.held, render, executor_, {}).flux;
+  return render_field(part.held, render, executor_, silent_).flux;
+}
+
+void WallModel::choose_light() {
+  const double wavelength = middle_wavelength(lens_.setup, kMmPerNm * options_.wavelength_nm);
+  FieldRenderSetup planned{lens_.setup, grid_};
+  planned.surface_height = height_;
+  if (!light_choice(planned, options_.light, false, wavelength).waves) return;
+  waves_.emplace();
+  waves_->wavelength = wavelength;
+  waves_->scatter = order_angles(wavelength, passes_);
+}
+
+std::vector<double> WallModel::diffraction_of(const Part& part) const {
+  const OpticalSetup point = lit_from(wide_, Eigen::Vector2d::Zero());
+  const SurfaceField* const surface = &part.held;
+  std::vector<double> more =
+      wave_flux(point, grid_, {&surface, 1}, *waves_, executor_, silent_).front();
+  const std::vector<double> by_rays = light_of(part, point);
+  for (std::size_t i = 0; i < more.size(); ++i) more[i] -= by_rays[i];
+  return more;
 }
 
 bool WallModel::shows(Deviation deviation) const {
@@ -360,9 +402,36 @@ Haze WallModel::haze_at(const OpticalSetup& optics, double more) const {
   return haze;
 }
 
+namespace {
+
+/// Every pixel as parts × parts equal ones.
+std::vector<double> in_parts(const std::vector<double>& light, const Eigen::Vector2i& pixels,
+                             int parts) {
+  std::vector<double> result;
+  result.reserve(light.size() * static_cast<std::size_t>(parts * parts));
+  for (int row = 0; row < parts * pixels.y(); ++row) {
+    for (int column = 0; column < parts * pixels.x(); ++column) {
+      const int pixel = row / parts * pixels.x() + column / parts;
+      result.push_back(light[static_cast<std::size_t>(pixel)] / (parts * parts));
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
 std::vector<double> WallModel::clear_flux(const Deviations& deviations) const {
   const OpticalSetup optics = optics_of(deviations);
-  return has_part() ? light_of(*part(deviations), optics) : flux_of_lens(lens_, optics, executor_);
+  if (!has_part()) return flux_of_lens(lens_, optics, executor_);
+  const std::shared_ptr<const Part> made = part(deviations);
+  std::vector<double> flux = light_of(*made, optics);
+  if (!by_waves()) return flux;
+  const auto from_point = [&](const OpticalSetup& sharp) {
+    return in_parts(made->diffraction, wide_.pixels, sharp.pixels.x() / wide_.pixels.x());
+  };
+  const std::vector<double> more = picture_by_convolution(optics, height_, from_point, executor_);
+  for (std::size_t i = 0; i < flux.size(); ++i) flux[i] += more[i];
+  return flux;
 }
 
 Image WallModel::picture(const Deviations& deviations) const {

@@ -64,16 +64,18 @@ std::optional<double> lamp_distance(const OpticalSetup& setup);
 /// Predicts pictures on the wall, with light around the picture's rectangle, by cam's chain: the
 /// finishing rows are planned and fitted once; the balls that they move, with deviations, leave a
 /// surface (MilledField), which is polished (PolishedField) and rendered (render_field(), a lamp
-/// with a width by a convolution). Where parts cannot be drawn (tolerance_fault(), creases) it is
-/// the lens as designed.
-/// Every step is kept and done anew only for the deviations that it depends on: a cut by ball,
-/// pitch error and backlash, a part by these and its polish, its light by these, the lamp and the
-/// wall. Not for several threads at once.
+/// with a width by a convolution). Where light_choice() asks for waves, what these add to a
+/// part's picture on the planned wall in the light of a point is added on other walls and in other
+/// light, too: to first order, since diffraction is a blur of a pixel or so. Where parts cannot be
+/// drawn (tolerance_fault(), creases) it is the lens as designed. Every step is kept and done anew
+/// only for the deviations that it depends on: a cut by ball, pitch error and backlash, a part by
+/// these and its polish, its light by these, the lamp and the wall. Not for several threads at
+/// once.
 class WallModel {
  public:
   /// @param lens  must outlive this. @param options  with the workshop.
   /// @param fine  pixels of the predicted pictures per pixel of the lens's picture, ≥ 1.
-  /// @throw Interrupted
+  /// @throw InputError for waves of a lens without a part; Interrupted
   WallModel(const Lens& lens, const CamOptions& options, int fine, const Executor& executor,
             const RunControl& control);
   WallModel(const WallModel&) = delete;
@@ -81,7 +83,7 @@ class WallModel {
   ~WallModel();
 
   /// Irradiance relative to all light spread evenly over the picture. Deviations beyond
-  /// deviation_limits() count as these. @throw Interrupted
+  /// deviation_limits() count as these. @throw Interrupted once the constructor's control stops
   [[nodiscard]] Image picture(const Deviations& deviations) const;
   /// ln of the size of that picture's pixels, in planned ones: those of another lamp's distance
   /// grow with the shadow of the lens, in which details keep their places.
@@ -93,6 +95,8 @@ class WallModel {
   [[nodiscard]] bool has_part() const { return !rows_.empty(); }
   /// Why there is no part; empty if there is one.
   [[nodiscard]] const std::string& fault() const { return fault_; }
+  /// True if diffraction is in the pictures.
+  [[nodiscard]] bool by_waves() const { return waves_.has_value(); }
   /// True if the deviation can show at all.
   [[nodiscard]] bool shows(Deviation deviation) const;
   /// Pixels of a picture beyond each side of the picture's rectangle.
@@ -132,12 +136,14 @@ class WallModel {
   };
 
   void plan_rows(const CutSetup& setup, const RunControl& control);
+  void choose_light();
   /// What a cut depends on: the ball's radius, a share; the pitch error; the backlash, mm.
   using CutKey = std::array<double, 3>;
   [[nodiscard]] std::shared_ptr<const Cut> cut(const CutKey& made) const;
   [[nodiscard]] std::shared_ptr<const Part> part(const Deviations& deviations) const;
   /// Shares of the light of a part.
   [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
+  [[nodiscard]] std::vector<double> diffraction_of(const Part& part) const;
   [[nodiscard]] Deviations within_limits(const Deviations& deviations) const;
   [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
   [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
@@ -154,9 +160,11 @@ class WallModel {
   double blank_top_ = 0.0;
   Passes passes_;
   std::string fault_;
-  std::vector<BallRows> rows_;  ///< Empty if there is no part.
-  GridWindow grid_;             ///< On which parts are sampled, if there is one.
+  std::vector<BallRows> rows_;        ///< Empty if there is no part.
+  GridWindow grid_;                   ///< On which parts are sampled, if there is one.
+  std::optional<WaveOptions> waves_;  ///< If the light goes as waves.
   Executor executor_;
+  RunControl silent_;  ///< Stops what is computed later.
   mutable Kept<CutKey, std::shared_ptr<const Cut>> cuts_;
   mutable Kept<std::pair<double, CutKey>, std::shared_ptr<const Part>> parts_;
   mutable Kept<Deviations, std::vector<double>> lights_;

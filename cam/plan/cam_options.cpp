@@ -560,17 +560,25 @@ void describe_programs(Description& d, CamOptions& o) {
   describe_spindle_start(d, o.spin_up, o.coolant);
 }
 
+}  // namespace
+
+void describe_light(Description& d, CamOptions& options, const std::string& picture) {
+  d.word("--light-model", options.light,
+         {{"auto", LightModel::kAuto}, {"rays", LightModel::kRays}, {"waves", LightModel::kWaves}},
+         picture +
+             ", by waves or by rays alone; auto: waves unless the lamp's image is much wider than "
+             "diffraction, or the surface has creases");
+  d.number("--wavelength", options.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength),
+           "nm", "of the waves; white light is as 550");
+}
+
+namespace {
+
 void describe_prediction(Description& d, CamOptions& o, const Description& shop) {
   d.without("--no-render", o.render, "programs only, without the predicted picture").essential =
       true;
   d.without("--no-remedies", o.remedies, "do not try what helps where most light leaks");
-  d.word(
-      "--light-model", o.light,
-      {{"auto", LightModel::kAuto}, {"rays", LightModel::kRays}, {"waves", LightModel::kWaves}},
-      "the picture that is judged, by waves or by rays alone; auto: waves unless the lamp's image "
-      "is much wider than diffraction, or the surface has creases");
-  d.number("--wavelength", o.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength), "nm",
-           "of the waves; white light is as 550");
+  describe_light(d, o, "the picture that is judged");
   d.whole(
        "--tolerances", o.tolerances, Limits::zero_or(cam_limit::kFewestParts, cam_limit::kMaxParts),
        "how sure the forecast is, and what matters: predict so many parts with the errors of the "

@@ -167,5 +167,7 @@ const char* words_for(SurfaceModel surface);
 
 /// The command's options. Numbers of the workshop file use its values and limits.
 void describe(Description& d, CamOptions& options);
+/// Of these the light's model and wavelength alone. @param picture  that they are of, in words.
+void describe_light(Description& d, CamOptions& options, const std::string& picture);
 
 }  // namespace lensforge

@@ -51,13 +51,6 @@ constexpr double kMicrometres = 1e3;
 /// much farther.
 constexpr double kOrderWidth = 1.2;
 
-/// Along x and y.
-Eigen::Vector2d order_angles(double wavelength, const Passes& passes) {
-  Eigen::Vector2d angles = Eigen::Vector2d::Constant(kOrderWidth * wavelength / passes.pitch);
-  if (!passes.cross) angles[passes.axis] = 0.0;
-  return angles;
-}
-
 /// nm, for the light that a roughness which is not stated might scatter.
 constexpr double kExampleRoughness = 10.0;
 
@@ -149,6 +142,12 @@ LeakMap leak_map(const LeakageChain& chain, const Prediction& prediction,
 }
 
 }  // namespace
+
+Eigen::Vector2d order_angles(double wavelength, const Passes& passes) {
+  Eigen::Vector2d angles = Eigen::Vector2d::Constant(kOrderWidth * wavelength / passes.pitch);
+  if (!passes.cross) angles[passes.axis] = 0.0;
+  return angles;
+}
 
 double smoothing_blur(const OpticalSetup& setup, double sigma) {
   const double enlarged = setup.image_size.cwiseQuotient(setup.lens_size).maxCoeff();

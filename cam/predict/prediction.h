@@ -123,6 +123,10 @@ class TrialCut {
 void try_remedies(const TrialSite& site, std::vector<LeakPlace>& places, const Executor& executor,
                   const RunControl& control);
 
+/// Angles along x and y within which a part's rows scatter beside their rays, rad:
+/// WaveOptions::scatter. @param wavelength  mm
+Eigen::Vector2d order_angles(double wavelength, const Passes& passes);
+
 /// Blur by a film or polish of σ, mm, in pixels: it moves the picture's detail like the lens's.
 double smoothing_blur(const OpticalSetup& setup, double sigma);
 

@@ -124,7 +124,7 @@ class Bench {
  private:
   std::filesystem::path folder_;
   Lens lens_ = virtual_wall::wavy_lens();
-  CamOptions options_;
+  CamOptions options_ = virtual_wall::light_by(LightModel::kRays);
   Executor executor_ = Executor::cpu(1);
   virtual_wall::Workshop workshop_{lens_, options_, executor_};
 };

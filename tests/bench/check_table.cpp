@@ -28,11 +28,13 @@
 /// docs/check.md.
 ///
 ///     check_table LENS [PHOTOGRAPHS-OF-EACH-CAUSE [WITH-TWO [WITHOUT-ANY [FOLDER [WORKSHOP
-///     [ROW]]]]]]
+///     [ROW [LIGHT [FORECAST]]]]]]]]
 ///
-/// "waves" for LENS is that of the tests, 4 mm and 32² pixels. A folder gets the photographs, for a
+/// "wavy" for LENS is that of the tests, 4 mm and 32² pixels. A folder gets the photographs, for a
 /// look at them with `lensforge check`. WORKSHOP is a file with the workshop that makes the parts
-/// and forecasts them; "" for FOLDER or WORKSHOP: none. With ROW, that row's photographs alone.
+/// and forecasts them; "" for FOLDER or WORKSHOP: none. With ROW, that row's photographs alone;
+/// "": all. LIGHT is "rays" or "waves", of the photographs, and FORECAST, else the same, of
+/// `check`.
 namespace lensforge {
 namespace {
 
@@ -189,12 +191,12 @@ std::set<std::string> names_of(const CauseFit& fit) {
 
 class Bench {
  public:
-  Bench(const Lens& lens, std::string folder, CamOptions options)
+  Bench(const Lens& lens, std::string folder, CamOptions options, LightModel forecast)
       : lens_(lens),
         folder_(std::move(folder)),
         options_(std::move(options)),
         workshop_(lens, options_, executor_),
-        model_(lens, options_, 5, executor_, {}) {}
+        model_(lens, with_light(options_, forecast), 5, executor_, {}) {}
 
   [[nodiscard]] virtual_wall::WallLight light(const Fault& fault) const {
     return workshop_.light(fault);
@@ -237,6 +239,11 @@ class Bench {
   [[nodiscard]] double lamp() const { return lamp_angle(lens_.setup); }
 
  private:
+  static CamOptions with_light(CamOptions options, LightModel model) {
+    options.light = model;
+    return options;
+  }
+
   const Lens& lens_;
   std::string folder_;
   CamOptions options_;
@@ -381,16 +388,21 @@ int main(int argc, char** argv) {
   try {
     if (argc < 2) {
       throw std::runtime_error(
-          "check_table LENS [EACH [PAIRS [WITHOUT [FOLDER [WORKSHOP [ROW]]]]]]");
+          "check_table LENS [EACH [PAIRS [WITHOUT [FOLDER [WORKSHOP [ROW [LIGHT [FORECAST]]]]]]]]");
     }
     const auto text = [&](int k) { return std::string(argc > k ? argv[k] : ""); };
     const auto count = [&](int k, int otherwise) {
       return argc > k ? std::atoi(argv[k]) : otherwise;
     };
-    const Lens lens = text(1) == "waves" ? virtual_wall::wavy_lens() : read_lens(text(1));
-    CamOptions options;
+    const Lens lens = text(1) == "wavy" ? virtual_wall::wavy_lens() : read_lens(text(1));
+    const auto model = [](const std::string& name) {
+      return name == "waves" ? LightModel::kWaves : LightModel::kRays;
+    };
+    CamOptions options = virtual_wall::light_by(model(text(8)));
     if (!text(6).empty()) options.workshop = read_workshop(text(6));
-    run(Bench(lens, text(5), options), {count(2, 29), count(3, 50), count(4, 50), text(7)});
+    const LightModel forecast = argc > 9 ? model(text(9)) : options.light;
+    run(Bench(lens, text(5), options, forecast),
+        {count(2, 29), count(3, 50), count(4, 50), text(7)});
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

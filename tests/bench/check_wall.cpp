@@ -39,7 +39,7 @@ void run(const std::string& folder, const std::string& workshop, const std::stri
          std::uint64_t seed) {
   constexpr int kPhotoPerPixel = 8;
   const Lens lens = read_lens(folder);
-  CamOptions options;
+  CamOptions options = virtual_wall::light_by(LightModel::kWaves);
   options.workshop = read_workshop(workshop);
   const Executor executor = Executor::cpu(1);
   const virtual_wall::Workshop maker(lens, options, executor);

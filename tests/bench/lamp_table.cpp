@@ -79,7 +79,7 @@ void pinholes(const Table& table, int cameras) {
 
 void lenses(const Table& table, int cameras, double times, double angle) {
   const Lens lens = virtual_wall::steep_lens(times);
-  const CamOptions options;
+  const CamOptions options = virtual_wall::light_by(LightModel::kRays);
   const Executor executor = Executor::cpu(1);
   const virtual_wall::Workshop workshop(lens, options, executor);
   for (const auto& [name, lamp] : virtual_wall::drawn_lamps(angle)) {

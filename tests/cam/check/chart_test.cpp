@@ -104,7 +104,7 @@ TEST_F(ChartTest, TwoAreRefused) {
 /// nearer.
 TEST_F(ChartTest, TellsTheLampsDistance) {
   const Lens lens = virtual_wall::wavy_lens();
-  const CamOptions options;
+  const CamOptions options = virtual_wall::light_by(LightModel::kRays);
   const Executor executor = Executor::cpu(2);
   virtual_wall::Fault fault;
   fault.vergence = 0.03;

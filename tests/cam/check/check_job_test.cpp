@@ -32,7 +32,7 @@ class CheckJob : public ::testing::Test {
   }
 
   Lens lens_ = virtual_wall::wavy_lens();
-  CamOptions options_;
+  CamOptions options_ = virtual_wall::light_by(LightModel::kRays);
   Executor executor_ = Executor::cpu(2);
 };
 
@@ -77,6 +77,16 @@ TEST_F(CheckJob, TellsTheTiltOfThePartFromTheWalls) {
   EXPECT_EQ(tilt.deviation, Deviation::kPartTiltY) << verdict_of(result, lens_, options_);
   EXPECT_NEAR(tilt.value, 0.12, 0.01);
   EXPECT_TRUE(tilt.alternatives.empty());
+}
+
+/// Waves blur by three quarters of a pixel, which rays have to explain by something.
+TEST_F(CheckJob, DiffractionIsNoFault) {
+  lens_.setup.extent.width = 0.0;
+  options_.light = LightModel::kWaves;
+  const CheckResult result = check({}, 3);
+  EXPECT_TRUE(result.by_waves);
+  EXPECT_TRUE(result.fit.found.empty()) << verdict_of(result, lens_, options_);
+  EXPECT_LT(result.fit.systematic, kMostSystematic);
 }
 
 /// A ball so far off that its scallops have little in common with what the derivatives tell.

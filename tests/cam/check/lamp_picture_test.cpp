@@ -101,7 +101,7 @@ TEST(LampPicture, RefusesPhotographsWithoutAWholeLamp) {
 /// for a disc a tenth as wide.
 TEST(LampPicture, ALensShowsTheLampBehindIt) {
   const Lens lens = virtual_wall::steep_lens(2.0);
-  const CamOptions options;
+  const CamOptions options = virtual_wall::light_by(LightModel::kRays);
   const Executor executor = Executor::cpu(2);
   const virtual_wall::Workshop workshop(lens, options, executor);
   const auto photo = [&](const virtual_wall::WallLight& light) {

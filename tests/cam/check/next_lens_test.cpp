@@ -36,7 +36,7 @@ class NextLensTest : public ::testing::Test {
   }
 
   Lens lens_ = virtual_wall::wavy_lens();
-  CamOptions options_;
+  CamOptions options_ = virtual_wall::light_by(LightModel::kRays);
 };
 
 TEST_F(NextLensTest, TheWorkshopLearnsPolishAndPitchError) {

@@ -15,9 +15,11 @@
 #include "cam/milled/milled_field.h"
 #include "cam/milled/polished_field.h"
 #include "cam/plan/finishing.h"
+#include "cam/predict/prediction.h"
 #include "core/image/color.h"
 #include "core/image/svg_drawing.h"
 #include "core/lens/surface_field.h"
+#include "design/waves/wave_picture.h"
 
 namespace lensforge::virtual_wall {
 namespace {
@@ -151,6 +153,12 @@ Lens wavy_lens() {
   return lens;
 }
 
+CamOptions light_by(LightModel model) {
+  CamOptions options;
+  options.light = model;
+  return options;
+}
+
 Workshop::Workshop(const Lens& lens, const CamOptions& options, const Executor& executor)
     : lens_(lens), options_(options), executor_(executor), setup_(cut_setup(lens, options)) {
   const CutPasses passes = cut_passes(setup_, executor);
@@ -217,10 +225,16 @@ WallLight Workshop::lit_by(const std::vector<LampPoint>& points, double spread,
   setup.grid = lens_grid(wall.lens_size, sample_spacings(options_, lens_.setup, setup_.passes()));
   setup.tile = 100000;
   std::vector<double> sum(static_cast<std::size_t>(wall.pixels.prod()), 0.0);
+  WaveOptions waves;
+  waves.scatter = order_angles(waves.wavelength, setup_.passes());
+  const SurfaceField* const surface = &part;
   for (const LampPoint& point : points) {
     setup.optics = at_point(wall, point.at);
-    const FluxPicture picture = render_field(part, setup, executor_, {});
-    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += point.share * picture.flux[i];
+    const std::vector<double> flux =
+        options_.light == LightModel::kWaves
+            ? wave_flux(setup.optics, setup.grid, {&surface, 1}, waves, executor_, {}).front()
+            : render_field(part, setup, executor_, {}).flux;
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += point.share * flux[i];
   }
   const double pixel = wall.image_size.x() / wall.pixels.x();
   if (spread > 0.0) {

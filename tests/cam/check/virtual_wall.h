@@ -68,10 +68,14 @@ struct DrawnLamp {
   double width = 0.0;  ///< Full angle, rad; of a lamp with a place mm.
 };
 
+/// The default workshop, its pictures by such light.
+CamOptions light_by(LightModel model);
+
 /// Cuts a lens once and shows what parts with faults project.
 class Workshop {
  public:
-  /// @param lens  must outlive this.
+  /// @param lens  must outlive this. @param options  kWaves for their light: by waves, else by
+  /// rays.
   Workshop(const Lens& lens, const CamOptions& options, const Executor& executor);
 
   [[nodiscard]] WallLight light(const Fault& fault) const;

@@ -67,7 +67,7 @@ std::vector<FaultCase> fault_cases(const Lens& lens) {
 /// lamp is another on either side: a convolution here, many points there.
 TEST(WallModel, FollowsEveryFault) {
   const Lens lens = virtual_wall::wavy_lens();
-  const CamOptions options;
+  const CamOptions options = virtual_wall::light_by(LightModel::kRays);
   const Executor executor = Executor::cpu(2);
   const virtual_wall::Workshop workshop(lens, options, executor);
   const WallModel model(lens, options, kFine, executor, {});
