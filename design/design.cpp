@@ -117,10 +117,12 @@ void require_surface(const DesignTask& task, const Checkpoint& state) {
   if (fault) refuse_checkpoint(task.options.checkpoint, "holds a surface of no lens: " + *fault);
 }
 
-bool run_all(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
-  return run_levels(task, log, state);
+/// Runs the steps of a design. One that is refused leaves no checkpoint: resuming would fail again,
+/// and the checkpoint would refuse better options.
+template <class Steps>
+auto run_all(const DesignTask& task, const Steps& steps) try {
+  return steps();
 } catch (const InputError&) {
-  // Resuming would fail again, and the checkpoint would refuse better options.
   std::error_code ignored;
   if (!task.options.resume) std::filesystem::remove(task.options.checkpoint, ignored);
   throw;
@@ -163,7 +165,7 @@ DesignResult unfinished(const DesignTask& task, SurfaceMesh mesh, const Executor
 
 DesignResult run_to_end(const DesignTask& task, DesignLog& log, Checkpoint& state,
                         const Executor& executor) {
-  if (run_all(task, log, state)) {
+  if (run_all(task, [&] { return run_levels(task, log, state); })) {
     try {
       return finished(task, log, state.mesh);
     } catch (const Interrupted&) {
@@ -174,11 +176,11 @@ DesignResult run_to_end(const DesignTask& task, DesignLog& log, Checkpoint& stat
 }
 
 /// The lens of shape_two_faces().
-Lens two_face_lens(const DesignTask& task, const Image& second, TwoFaceResult& shaped, Look look,
-                   const Executor& executor) {
+Lens two_face_lens(const DesignTask& task, const Image& second, const TwoFaceResult& shaped,
+                   Look look, const Executor& executor) {
   Lens lens;
   lens.model = SurfaceModel::kSpline;
-  lens.spline = {shaped.net, std::move(shaped.faces.exit)};
+  lens.spline = {shaped.net, shaped.faces.exit};
   lens.surface = spline_nodes(*lens.spline, kMeshSamples).mesh;
   lens.setup = task.setup;
   lens.setup.front = height_front(shaped.faces.front, task.setup.lens_size);
@@ -195,19 +197,27 @@ Lens two_face_lens(const DesignTask& task, const Image& second, TwoFaceResult& s
   return lens;
 }
 
-/// A design of both faces. It has no checkpoint.
+/// A design of both faces. @throw InputError as shape_two_faces() does.
 DesignResult design_two_faces(const DesignTask& task, const Executor& executor) {
   const Image second =
       working_picture(*task.options.second.picture, task.options, {task.control.stop_token(), {}});
-  TwoFaceResult shaped = shape_two_faces(task, second);
+  TwoFaceResult shaped = run_all(task, [&] { return shape_two_faces(task, second); });
   DesignResult result;
-  if (shaped.done) result.status = DesignResult::Status::kDone;
-  result.message = shaped.done ? "both faces done" : "interrupted; --second cannot be resumed";
+  result.message = "interrupted";
+  result.fingerprint = shaped.fingerprint;
   result.convergence = std::move(shaped.convergence);
-  task.control.report({"design", 1.0, 1.0, "rendering the lens"});
-  const Look look = shaped.done ? Look::kThorough : Look::kBrief;
-  result.lens = two_face_lens(task, second, shaped, look, executor);
-  result.fingerprint = design_fingerprint(task.target, task.options);
+  if (shaped.done) {
+    task.control.report({"design", 1.0, 1.0, "rendering the lens"});
+    try {
+      result.lens = two_face_lens(task, second, shaped, Look::kThorough, task.executor);
+      result.status = DesignResult::Status::kDone;
+      result.message = "both faces done";
+      return result;
+    } catch (const Interrupted&) {
+      // Resuming continues after the last round.
+    }
+  }
+  result.lens = two_face_lens(task, second, shaped, Look::kBrief, executor);
   return result;
 }
 

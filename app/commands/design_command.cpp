@@ -171,9 +171,6 @@ void read_second(DesignSettings& settings, const RunControl& control) {
   if (!settings.live.empty()) {
     throw InputError("--live " + settings.live + ": shows one picture; leave it out with --second");
   }
-  if (settings.resume) {
-    throw InputError("--resume: a design with --second keeps no checkpoint; leave it out");
-  }
   LoadedImage loaded =
       read_image(second.file, control, settings.design.pixels, settings.background);
   note_changes(settings, "--second " + second.file, loaded.changes);
@@ -606,7 +603,7 @@ CommandResult finish(CommandFrame& frame, const ChosenDevice& device,
   if (done) {
     outcome.notes.push_back("look at " + (folder / lens_file::kOverview).string() +
                             "; then: " + making_words(settings, folder));
-  } else if (!design.second.picture) {
+  } else {
     outcome.notes.emplace_back(kContinueWithResume);
   }
   return outcome;

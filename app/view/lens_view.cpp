@@ -223,13 +223,23 @@ constexpr double kViewNodes = 480e3;
 /// Samples of a height map, 4 bytes each in a page.
 constexpr std::size_t kMaxHeights = 1'000'000;
 
+/// The setup of the screen on which a slope moves light by more pixels: of two the farther one, in
+/// widths of its picture.
+OpticalSetup strictest_setup(const Lens& lens) {
+  if (!lens.setup.second) return lens.setup;
+  OpticalSetup second = on_second_screen(lens.setup);
+  const auto reach = [](const OpticalSetup& s) { return s.focal_length / s.image_size.x(); };
+  return reach(second) > reach(lens.setup) ? second : lens.setup;
+}
+
 StoredSurface stored_design(const Lens& lens) {
+  const OpticalSetup setup = strictest_setup(lens);
   if (lens.spline) {
     const auto cells = static_cast<double>(lens.spline->cell_count());
-    return store_spline(*lens.spline, samples_for(kViewNodes, cells), lens.setup);
+    return store_spline(*lens.spline, samples_for(kViewNodes, cells), setup);
   }
-  if (lens.model == SurfaceModel::kFacet) return store_surface(lens.surface, {}, lens.setup);
-  return store_surface(lens.surface, vertex_area_normals(lens.surface), lens.setup);
+  if (lens.model == SurfaceModel::kFacet) return store_surface(lens.surface, {}, setup);
+  return store_surface(lens.surface, vertex_area_normals(lens.surface), setup);
 }
 
 /// The picture of a surface as stored against the program's own.
@@ -250,6 +260,14 @@ void require_small_front(const OpticalSetup& setup, const std::string& name) {
   if (map == nullptr || map->spline->coefficients().size() <= kMaxHeights) return;
   throw InputError(name + ": its front has more than " + std::to_string(kMaxHeights) +
                    " samples, too many for a page; render draws its picture");
+}
+
+/// The same surface on the second screen. @pre lens.second
+Lens on_second(Lens lens) {
+  lens.setup = on_second_screen(lens.setup);
+  lens.target = lens.second->target;
+  lens.render = lens.second->render;
+  return lens;
 }
 
 /// A surface with the picture that the program has of it.
@@ -305,6 +323,9 @@ void relight(const OtherLight& light, Lens lens, const CutForecast& forecast,
       lens.model = SurfaceModel::kSpline;
     }
     evaluate(lens, lens.model, &viewed.picture, executor, Look::kBrief, control);
+    if (view.second && viewed.id == "designed") {
+      evaluate(on_second(lens), lens.model, &view.second->picture, executor, Look::kBrief, control);
+    }
   }
   std::erase_if(view.causes, [](const ViewedCause& step) { return step.surface.empty(); });
   for (ViewedCause& step : view.causes) {
@@ -360,8 +381,17 @@ LensView view_of_lens(const Lens& lens, const std::string& name, const Executor&
   view.setup = lens.setup;
   view.model = model_name(lens.model);
   view.target = lens.target;
+  StoredSurface stored = stored_design(lens);
+  double second_error = 0.0;
+  if (lens.second) {
+    const Lens far = on_second(lens);
+    view.second = {far.target, far.render};
+    second_error = storage_error(stored.read_back, far.setup, far.target, far.render, executor);
+  }
   view.surfaces.push_back(
-      viewed("designed", "as designed", stored_design(lens), lens.render, lens, executor));
+      viewed("designed", "as designed", std::move(stored), lens.render, lens, executor));
+  ViewedSurface& designed = view.surfaces.front();
+  designed.storage_error = std::max(designed.storage_error, second_error);
   view.causes.push_back({"the design", "designed", lens.render});
   view.relief = relief_of(lens);
   return view;
@@ -370,8 +400,9 @@ LensView view_of_lens(const Lens& lens, const std::string& name, const Executor&
 LensView read_view(const fs::path& folder, const OtherLight& light, const Executor& executor,
                    const RunControl& control) {
   const Lens lens = read_lens(folder);
-  if (lens.render.empty()) {
-    throw InputError(folder.string() + ": holds no " + lens_file::kRenderExr +
+  if (lens.render.empty() || (lens.second && lens.second->render.empty())) {
+    throw InputError(folder.string() + ": holds no " +
+                     (lens.render.empty() ? lens_file::kRenderExr : lens_file::kSecondRenderExr) +
                      ", the picture that the lens projects; design it again");
   }
   control.report({"picture", 0.0, 0.0, ""});
@@ -490,6 +521,12 @@ std::string data_of(const LensView& view) {
            {"target", data.picture(view.target)},
            {"surfaces", json::array()},
            {"chain", json::array()}};
+  if (view.second) {
+    all["second"] = {{"cause", "the design"},
+                     {"white", view.second->target.total() / pixels},
+                     {"target", data.picture(view.second->target)},
+                     {"picture", data.picture(view.second->picture)}};
+  }
   for (const ViewedCause& step : view.causes) {
     all["chain"].push_back({{"cause", step.cause},
                             {"surface", step.surface},
@@ -512,6 +549,11 @@ std::string stored_pictures(const LensView& view) {
   std::string html = picture_figure(view.target, "Target", "the picture that was asked for");
   for (const ViewedSurface& viewed : view.surfaces) {
     html += picture_figure(viewed.picture, "Light", viewed.words);
+  }
+  if (view.second) {
+    html += picture_figure(view.second->target, "Second target", "the second picture");
+    html +=
+        picture_figure(view.second->picture, "Second light", "on the second screen, as designed");
   }
   return html;
 }
@@ -555,6 +597,12 @@ std::string facts(const LensView& view) {
   facts.push_back({"Keys",
                    "Tab moves between controls, arrows change them; on the picture arrows move "
                    "the mark and Shift makes ten pixels of it"});
+  if (view.second) {
+    facts.push_back(
+        {"Between the pictures",
+         "the screen's place, size and turn change evenly from the first to the second; "
+         "target and difference are those of the nearer one"});
+  }
   return html_facts(facts);
 }
 
@@ -585,12 +633,16 @@ std::string size_words(const Eigen::Vector2d& size) {
   return decimal_text(size.x(), 0) + " × " + decimal_text(size.y(), 0) + " mm";
 }
 
+std::string screen_words(const OpticalSetup& setup) {
+  return size_words(setup.image_size) + " at z = " + decimal_text(setup.focal_length, 0) + " mm";
+}
+
 std::string header(const LensView& view) {
   const OpticalSetup& setup = view.setup;
   const std::string words =
       capitalised(traits(setup.body).name) + " of " + size_words(setup.lens_size) + ", " +
-      view.model + " model, in " + traits(setup.lamp).name + "; picture of " +
-      size_words(setup.image_size) + " at z = " + decimal_text(setup.focal_length, 0) + " mm" +
+      view.model + " model, in " + traits(setup.lamp).name + "; picture of " + screen_words(setup) +
+      (view.second ? ", the second of " + screen_words(on_second_screen(setup)) : "") +
       (view.other_light.empty() ? "" : "; drawn with " + view.other_light);
   return element("h1", "", escape_html(view.name)) + element("p", "", escape_html(words));
 }

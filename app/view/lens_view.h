@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ struct ViewedSurface {
   std::string words;  ///< Short description.
   StoredSurface surface;
   Image picture;  ///< The picture it projects, computed by the program; linear light.
-  /// MAE between that picture and the one of the stored surface, both computed by the program.
+  /// MAE between that picture and the one of the stored surface, both computed by the program; of a
+  /// designed surface for two pictures, the larger one.
   double storage_error = 0.0;
 
   /// True if a page draws it; else it shows `picture` until a control is moved.
@@ -46,12 +48,19 @@ struct ViewedCause {
   Image picture;        ///< Linear light.
 };
 
+/// A lens's second picture, of the designed surface.
+struct ViewedSecond {
+  Image target;   ///< Linear light.
+  Image picture;  ///< As ViewedSurface::picture.
+};
+
 /// Content of a lens's page.
 struct LensView {
   std::string name;
   OpticalSetup setup;
   std::string model;                    ///< model_name()
   Image target;                         ///< Linear light.
+  std::optional<ViewedSecond> second;   ///< Of a lens for two pictures.
   std::vector<ViewedSurface> surfaces;  ///< The designed one comes first.
   std::vector<WavePicture> waves;       ///< Of the folder, if design or cam followed waves.
   /// The causes of error between target and part, step by step, and the surface for each.

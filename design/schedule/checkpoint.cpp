@@ -20,8 +20,8 @@
 #include "core/text/words.h"
 #include "design/setup/design_options.h"
 
-// After the header come the vertices and, if the header has scales, the reach of their steps, as
-// doubles.
+// After the header come, as doubles, the vertices, if the header has scales the reach of their
+// steps, and if it has from_planes the samples of the front.
 
 namespace lensforge {
 namespace {
@@ -29,8 +29,11 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view kMagic = "lensforge checkpoint 4\n";
+/// Key of a design of two faces.
+constexpr const char* kFromPlanes = "from_planes";
 
-std::span<const double> entries(const Eigen::Matrix3Xd& matrix) {
+template <class Matrix>
+std::span<const double> entries(const Matrix& matrix) {
   return {matrix.data(), static_cast<std::size_t>(matrix.size())};
 }
 
@@ -133,10 +136,55 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
   header.update({{"fingerprint", checkpoint.fingerprint},
                  {"scales", steps.known() ? json{steps.xy, steps.z} : json()},
                  {"convergence", rows}});
+  if (checkpoint.front.size() > 0) header[kFromPlanes] = checkpoint.from_planes;
   std::string numbers(bytes_of(entries(checkpoint.mesh.vertices)));
   numbers += bytes_of(entries(steps.reach));
+  numbers += bytes_of(entries(checkpoint.front));
   write_checkpoint_file(path, kMagic, {header, numbers});
 }
+
+namespace {
+
+/// Takes the surface and what else the header announces. @pre the header's values were read.
+void read_numbers(const std::filesystem::path& path, const CheckpointContent& parts,
+                  Checkpoint& checkpoint) {
+  const GridShape shape = checkpoint.mesh.grid;
+  const json& scales = parts.header.at("scales");
+  const bool two_faces = parts.header.contains(kFromPlanes);
+  const int least = two_faces ? kSplineDegree + 1 : 2;
+  const double vertices = double{1} * shape.columns * shape.rows;
+  const GridShape front = two_faces ? front_shape(shape) : GridShape{};
+  const double count =
+      (scales.is_null() ? 3.0 : 6.0) * vertices + double{1} * front.columns * front.rows;
+  if (shape.columns < least || shape.rows < least ||
+      static_cast<double>(parts.numbers.size()) != sizeof(double) * count) {
+    refuse_checkpoint(path, "holds fewer vertices than its header says");
+  }
+  const char* next = parts.numbers.data();
+  const auto take = [&](auto& matrix) {
+    const std::size_t bytes = static_cast<std::size_t>(matrix.size()) * sizeof(double);
+    std::memcpy(matrix.data(), next, bytes);
+    next += bytes;
+  };
+  checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
+  take(checkpoint.mesh.vertices);
+  if (!scales.is_null()) {
+    checkpoint.scales.xy = scales.at(0);
+    checkpoint.scales.z = scales.at(1);
+    checkpoint.scales.reach.resizeLike(checkpoint.mesh.vertices);
+    take(checkpoint.scales.reach);
+  }
+  if (two_faces) {
+    checkpoint.from_planes = parts.header.at(kFromPlanes);
+    checkpoint.front.resize(front.columns, front.rows);
+    take(checkpoint.front);
+  }
+  if (!checkpoint.mesh.vertices.allFinite() || !checkpoint.front.allFinite()) {
+    refuse_checkpoint(path, "holds a vertex that is not finite");
+  }
+}
+
+}  // namespace
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {
   const CheckpointContent parts = read_checkpoint_file(path, kMagic);
@@ -147,25 +195,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     for (const json& row : parts.header.at("convergence")) {
       read_row(description_of(checkpoint.convergence.emplace_back()), row);
     }
-    const GridShape shape = checkpoint.mesh.grid;
-    const json& scales = parts.header.at("scales");
-    const std::size_t bytes = parts.numbers.size() / (scales.is_null() ? 1 : 2);
-    const std::size_t count = bytes / (3 * sizeof(double));
-    if (shape.columns < 2 || shape.rows < 2 ||
-        static_cast<std::size_t>(shape.columns) * static_cast<std::size_t>(shape.rows) != count ||
-        parts.numbers.size() != count * 3 * sizeof(double) * (scales.is_null() ? 1 : 2)) {
-      refuse_checkpoint(path, "holds fewer vertices than its header says");
-    }
-    checkpoint.mesh = make_grid_mesh(Eigen::Vector2d::Ones(), shape, 0.0);
-    std::memcpy(checkpoint.mesh.vertices.data(), parts.numbers.data(), bytes);
-    if (!checkpoint.mesh.vertices.allFinite())
-      refuse_checkpoint(path, "holds a vertex that is not finite");
-    if (!scales.is_null()) {
-      checkpoint.scales.xy = scales.at(0);
-      checkpoint.scales.z = scales.at(1);
-      checkpoint.scales.reach.resizeLike(checkpoint.mesh.vertices);
-      std::memcpy(checkpoint.scales.reach.data(), parts.numbers.data() + bytes, bytes);
-    }
+    read_numbers(path, parts, checkpoint);
     return checkpoint;
   } catch (const json::exception&) {
     refuse_checkpoint(path, "has a bad header: a field is missing or of another type");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +11,7 @@
 
 #include "core/image/image.h"
 #include "core/mesh/surface_mesh.h"
+#include "core/spline/control_net.h"
 #include "design/energy/objective_options.h"
 #include "design/schedule/guided_optimization.h"
 #include "design/schedule/levels.h"
@@ -27,10 +29,17 @@ struct Checkpoint {
       std::numeric_limits<double>::infinity();  ///< Objective after the level's last round.
   bool transporting = true;  ///< True if the level's next round may begin with transport.
   double seconds = 0.0;      ///< Spent so far.
-  SurfaceMesh mesh;          ///< A grid mesh.
+  SurfaceMesh mesh;          ///< A grid mesh. Of two faces: control points of the exit face.
+  Eigen::MatrixXd front;     ///< Of two faces: LensFaces::front, of front_shape(); else empty.
+  bool from_planes = false;  ///< Of two faces: they began as planes, not with transport.
   StepScales scales;         ///< For the level's further rounds.
   std::vector<ConvergenceRow> convergence;
 };
+
+/// Samples of the front of two faces, one at each knot of the exit face.
+inline GridShape front_shape(const GridShape& net) {
+  return {net.columns - kSplineDegree + 1, net.rows - kSplineDegree + 1};
+}
 
 /// Describes the plain values of a checkpoint's header.
 void describe(Description& d, Checkpoint& checkpoint);
@@ -80,9 +89,10 @@ class DesignLog {
   /// The last remark, to be appended to a message; empty if there is none.
   [[nodiscard]] const std::string& remark() const { return remark_; }
 
- private:
+  /// A row of this level, round and time without figures.
   [[nodiscard]] ConvergenceRow new_row(const char* stage, int iteration) const;
 
+ private:
   const DesignTask& task_;
   Checkpoint& state_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

@@ -379,9 +379,11 @@ std::string owner_of(const Checkpoint& saved, const DesignTask& task) {
   return "another picture or other options";
 }
 
-Checkpoint resumed(const DesignTask& task, std::uint64_t fingerprint) {
+}  // namespace
+
+Checkpoint saved_state(const DesignTask& task) {
   Checkpoint saved = read_checkpoint(task.options.checkpoint);
-  if (saved.fingerprint != fingerprint) {
+  if (saved.fingerprint != design_fingerprint(task.target, task.options)) {
     throw InputError("checkpoint '" + task.options.checkpoint.string() + "' belongs to " +
                      owner_of(saved, task));
   }
@@ -394,10 +396,12 @@ Checkpoint resumed(const DesignTask& task, std::uint64_t fingerprint) {
   return saved;
 }
 
-void save(const DesignTask& task, const DesignLog& log, Checkpoint& state) {
+void save_state(const DesignTask& task, const DesignLog& log, Checkpoint& state) {
   state.seconds = log.seconds();
   if (!task.options.checkpoint.empty()) write_checkpoint(state, task.options.checkpoint);
 }
+
+namespace {
 
 void begin_next_level(Checkpoint& state) {
   state.round = 0;
@@ -482,27 +486,26 @@ bool run_level(const DesignTask& task, DesignLog& log, Checkpoint& state) {
       state.value = stage->value(state.mesh);
     }
     if (!run_round({task, level, problem, *stage, log}, state)) return false;
-    if (state.round < level.rounds) save(task, log, state);
+    if (state.round < level.rounds) save_state(task, log, state);
   }
   begin_next_level(state);
-  save(task, log, state);
+  save_state(task, log, state);
   return true;
 }
 
 }  // namespace
 
 Checkpoint first_state(const DesignTask& task) {
-  const std::uint64_t fingerprint = design_fingerprint(task.target, task.options);
-  if (task.options.resume) return resumed(task, fingerprint);
+  if (task.options.resume) return saved_state(task);
   Checkpoint state;
-  state.fingerprint = fingerprint;
+  state.fingerprint = design_fingerprint(task.target, task.options);
   state.mesh =
       start_surface(task.setup, task.levels.front().grid, task.options.thickness, task.executor);
   return state;
 }
 
 bool run_levels(const DesignTask& task, DesignLog& log, Checkpoint& state) try {
-  if (!task.options.resume) save(task, log, state);
+  if (!task.options.resume) save_state(task, log, state);
   while (state.level < static_cast<int>(task.levels.size())) {
     if (!run_level(task, log, state)) return false;
   }

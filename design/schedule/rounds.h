@@ -54,9 +54,16 @@ struct RoundOutcome {
 /// @param rounds  number of rounds of the level.
 void conclude_round(const RoundOutcome& outcome, int rounds, Checkpoint& state);
 
-/// Returns the state that a design starts from: a flat surface, or the state in its checkpoint.
-/// @throw InputError if a checkpoint to resume from is missing, corrupt, or belongs to another
-///        picture or other options.
+/// Returns the state in the checkpoint of a task that is resumed.
+/// @throw InputError if it is missing, corrupt, or belongs to another picture or other options.
+Checkpoint saved_state(const DesignTask& task);
+
+/// Writes the state, with the time that the log has counted, if the task has a checkpoint.
+/// @throw RunError if it cannot be written.
+void save_state(const DesignTask& task, const DesignLog& log, Checkpoint& state);
+
+/// Returns the state that a design starts from: a flat surface, or saved_state().
+/// @throw InputError as saved_state() does.
 Checkpoint first_state(const DesignTask& task);
 
 /// Runs the remaining levels, coarse to fine, round by round (Sun et al., section 3.4 and Appendix

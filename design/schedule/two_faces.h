@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "core/compute/executor.h"
@@ -18,7 +19,8 @@ namespace lensforge {
 /// Both faces of a lens for two pictures, and the record of their design.
 struct TwoFaceResult {
   LensFaces faces;
-  GridShape net;  ///< Of the control points of faces.exit.
+  GridShape net;                  ///< Of the control points of faces.exit.
+  std::uint64_t fingerprint = 0;  ///< design_fingerprint()
   std::vector<ConvergenceRow> convergence;
   bool done = false;  ///< False if the control stopped it; the faces are then the best so far.
 };
@@ -29,9 +31,12 @@ struct TwoFaceResult {
 /// From plane faces, the coarsest pictures come out of even light by degrees: their targets are
 /// mixed with what the plane lens projects, less of it from stage to stage, so that the light never
 /// has to jump. The faces of each resolution are refined for the next. At the end the front is at z
-/// = 0 or below and the exit face at the task's thickness or above.
+/// = 0 or below and the exit face at the task's thickness or above. The checkpoint is written
+/// before and after transport and after every round.
 /// @pre task.setup.second; second has the size of the task's picture.
-/// @throw InputError if the barriers refuse the lens that the design starts from.
+/// @throw InputError if the barriers refuse the lens that the design starts from, or if a
+/// checkpoint
+///        to resume from is missing, corrupt, or belongs to another picture or other options.
 TwoFaceResult shape_two_faces(const DesignTask& task, const Image& second);
 
 /// A picture, linear light, on the screen of a setup.

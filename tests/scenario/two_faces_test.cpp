@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <functional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -134,6 +137,45 @@ TEST_F(TwoFaces, ShareTheSlopesOfOnePicture) {
   }
 }
 
+/// Arguments of a design into a folder, with more options.
+using DesignOf = std::function<Arguments(const std::string& out, const Arguments& more)>;
+
+/// Compares a lens with one whose design was stopped after its first checkpoint and resumed.
+/// @param folder  receives both.
+void expect_resumed_equals_whole(const DesignOf& design, const fs::path& folder, int signal) {
+  const fs::path whole = folder / "whole";
+  const fs::path stopped = folder / "stopped";
+  ASSERT_EQ(run(design(whole.string(), {})).exit_code, 0);
+  Process process(design(stopped.string(), {}));
+  while (!fs::exists(stopped / "checkpoint.bin")) {
+    ASSERT_TRUE(process.runs_for(std::chrono::milliseconds(5))) << process.wait().err;
+  }
+  process.runs_for(std::chrono::milliseconds(100));
+  process.send(signal);
+  const Outcome ended = process.wait();
+  EXPECT_EQ(ended.signal == 0 ? ended.exit_code : -ended.signal, signal == SIGINT ? 130 : -signal);
+  expect_refusal(run(design(stopped.string(), {"--resume", "--ior", "1.6"})), 2,
+                 {"checkpoint", "another picture or other options"});
+  const Outcome done = run(design(stopped.string(), {"--resume", "--threads", "1"}));
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_EQ(listing(stopped), listing(whole));
+  for (const std::string& name : listing(stopped)) {
+    if (name == "lens.json" || name == "convergence.csv") continue;  // They have times.
+    EXPECT_TRUE(content(stopped / name) == content(whole / name)) << name;
+  }
+}
+
+TEST_F(TwoFaces, OfTwoPicturesStoppedAndResumedGiveTheSameLens) {
+  expect_resumed_equals_whole(two_pictures, at(""), SIGINT);
+}
+
+TEST_F(TwoFaces, OfOnePictureKilledAndResumedGiveTheSameLens) {
+  const auto design = [](const std::string& out, const Arguments& more) {
+    return one_picture("two", out, more);
+  };
+  expect_resumed_equals_whole(design, at(""), SIGKILL);
+}
+
 TEST_F(TwoFaces, ShapeTheFrontWithoutTheLampsExtent) {
   const Outcome made = run(one_picture(
       "two", path("lens"), {"--source-angle", "2", "--source-picture", picture("rings.png")}));
@@ -166,7 +208,7 @@ TEST_F(TwoFaces, WhatTheyCannotHaveIsRefusedInOneLine) {
       {{"--wavelengths", "450,550,650"}, {"--wavelengths", "--second"}},
       {{"--fresnel"}, {"--fresnel", "--second"}},
       {{"--outline", "circle"}, {"--outline", "--second"}},
-      {{"--resume"}, {"--resume", "--second"}},
+      {{"--live", "0"}, {"--live", "--second"}},
       {{"--second-tilt", "85,0"}, {"--second-tilt 85", "0,0 works"}}};
   for (const auto& [options, words] : faults) {
     expect_refusal(run(two_pictures(path("lens"), options)), 2, words);

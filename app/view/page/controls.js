@@ -25,7 +25,7 @@ function set(name, value) {
   refresh();
   if (kOnlyShown.has(name)) ask();
   else begin();
-  if (name === "screenSize") drawAxes();
+  if (name === "screenSize" || name === "between") drawAxes();
 }
 
 function refresh() {
@@ -48,9 +48,10 @@ function makeControl(control, group) {
   Object.assign(input, { type: "range", min: control.low, max: control.high, step: "any" });
   input.addEventListener("input", () => {
     const at = Number(input.value), value = control.value ? control.value(at) : at;
-    // The slider catches at the default.
+    // The slider catches at the default, and at the second of two screens.
     const start = control.slide ? control.slide(control.start) : control.start;
-    set(control.name, Math.abs(at - start) < 0.008 * (control.high - control.low) ? control.start : value);
+    const close = (place) => Math.abs(at - place) < 0.008 * (control.high - control.low);
+    set(control.name, close(start) ? control.start : control.two && close(control.high) ? control.high : value);
   });
   // Ten steps of the arrow keys for a hundredth would be too many.
   input.addEventListener("keydown", (e) => {
@@ -171,7 +172,7 @@ window.lensView = {
 };
 const lensView = window.lensView;
 
-paint(find("target"), (i) => { const v = Math.round(255 * encoded(target[i])); return [v, v, v]; });
+paintTarget();
 {
   const context = find("scale").getContext("2d");
   data.colors.forEach((color, i) => { context.fillStyle = `rgb(${color})`; context.fillRect(i, 0, 1, 1); });

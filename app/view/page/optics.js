@@ -29,17 +29,23 @@ function indexAt(index, abbe, wavelength) {
   return index + slope * (square(wavelength) - square(587.56));
 }
 
-// The lens as it stands in lens.json: where its middle is, how its light comes, where the screen is.
-// map: of a front that is a height map, its samples along x and y; else null.
+// A screen as it stands in lens.json, with its axis on the side that light goes to.
+function readScreen(screen, middle) {
+  const { centre, right, up, size } = screen;
+  const away = cross(right, up);
+  return { centre, right, up, size,
+           away: dot(away, sum([1, centre], [-1, middle])) < 0 ? sum([-1, away]) : away };
+}
+
+// The lens as it stands in lens.json: where its middle is, how its light comes, where its screens
+// are. map: of a front that is a height map, its samples along x and y; else null.
 function readSetup(setup, map) {
   const middle = [setup.lens_size[0] / 2, setup.lens_size[1] / 2, 0];
   const point = setup.source.type === "point" ? setup.source.position : null;
   const light = point ? unit(sum([1, middle], [-1, point])) : setup.source.direction;
   const distance = point ? norm(sum([1, middle], [-1, point])) : Infinity;
   const width = point ? (setup.source.size_mm || 0) / distance : (setup.source.angle_mrad || 0) / 1e3;
-  const screen = setup.screen;
-  const towards = sum([1, screen.centre], [-1, middle]);
-  const away = cross(screen.right, screen.up);
+  const screen = readScreen(setup.screen, middle);
   return {
     middle, light, distance, width, shape: setup.source.shape || null,
     mirror: setup.mode === "reflect",
@@ -50,9 +56,8 @@ function readSetup(setup, map) {
     samples: map ? [map.columns, map.rows, (map.columns - 1) / setup.lens_size[0],
                     (map.rows - 1) / setup.lens_size[1]] : [0, 0, 0, 0],
     index: setup.ior,
-    size: screen.size, right: screen.right, up: screen.up,
-    away: dot(away, towards) < 0 ? sum([-1, away]) : away,
-    screenDistance: norm(towards), towards: unit(towards),
+    screen, second: setup.second ? readScreen(setup.second, middle) : null,
+    screenDistance: norm(sum([1, screen.centre], [-1, middle])),
     lensArea: setup.lens_size[0] * setup.lens_size[1],
     pixels: setup.pixels,
   };
@@ -90,6 +95,22 @@ function shapePoints(shape) {
   return points;
 }
 
+// The screen that the settings ask for, before it is tilted. Between two its size, place and turn
+// change evenly from the first to the second.
+function screenAt(optics, settings) {
+  const { middle, screen, second } = optics;
+  if (!second) {
+    const far = settings.screenDistance / optics.screenDistance;
+    return { ...screen, centre: sum([1, middle], [far, sum([1, screen.centre], [-1, middle])]) };
+  }
+  const share = settings.between;
+  const mix = (name) => sum([1 - share, screen[name]], [share, second[name]]);
+  const right = unit(mix("right")), across = mix("up");
+  return { centre: mix("centre"), right, up: unit(sum([1, across], [-dot(across, right), right])),
+           away: unit(mix("away")),
+           size: [0, 1].map((k) => (1 - share) * screen.size[k] + share * second.size[k]) };
+}
+
 // The lamp and the screen for one point of the source.
 function placedOptics(optics, settings, at) {
   const frame = frameAcross(optics.light);
@@ -104,7 +125,8 @@ function placedOptics(optics, settings, at) {
   const lamp = parallel ? turned(unit(sum([-1, from])))
                         : standing(sum([settings.lampDistance, from]));
   const way = parallel ? lamp : sum([1, optics.middle], [-1, lamp]);
-  const tilt = (v) => rotated(rotated(v, optics.right, settings.tiltRight * kDegree), optics.up,
+  const screen = screenAt(optics, settings);
+  const tilt = (v) => rotated(rotated(v, screen.right, settings.tiltRight * kDegree), screen.up,
                               settings.tiltUp * kDegree);
   const bent = optics.front[3] !== 0 || optics.samples[0] > 0;
   return {
@@ -117,7 +139,7 @@ function placedOptics(optics, settings, at) {
     scale: parallel ? 1 : dot(way, way) * norm(way) / way[2],
     loses: optics.loses, varies: !parallel || bent,
     straight: parallel && !bent && !optics.mirror && !optics.loses && lamp[2] === 1,
-    centre: standing(sum([settings.screenDistance, optics.towards])),
-    right: turned(tilt(optics.right)), up: turned(tilt(optics.up)), away: turned(tilt(optics.away)),
+    centre: standing(sum([1, screen.centre], [-1, optics.middle])),
+    right: turned(tilt(screen.right)), up: turned(tilt(screen.up)), away: turned(tilt(screen.away)),
   };
 }

@@ -5,7 +5,7 @@ const find = (name) => document.querySelector(`[data-${name}]`);
 const data = JSON.parse(document.getElementById("light-data").textContent);
 const optics = readSetup(data.setup, data.front);
 const [kColumns, kRows] = optics.pixels;
-const target = pictureOf(data.target);
+const targets = [data, data.second].filter((one) => one).map((one) => pictureOf(one.target));
 
 function encoded(light) {
   const x = Math.min(1, Math.max(0, light));
@@ -20,10 +20,12 @@ const signed = (value, digits) => (value < 0 ? "" : "+") + fixed(value, digits);
 const lensWidth = Math.max(...data.setup.lens_size);
 const nearest = Math.min(1.5 * lensWidth, optics.distance);
 const kControls = [
+  { group: "Screen", name: "between", words: "From the first picture to the second", start: 0, low: 0, high: 1,
+    say: (v, s) => `z = ${fixed(screenAt(optics, s).centre[2], 0)} mm`, two: true },
   { group: "Screen", name: "screenDistance", words: "Distance", start: optics.screenDistance,
-    low: 0.25 * optics.screenDistance, high: 2.5 * optics.screenDistance, say: (v) => fixed(v, 0) + " mm" },
+    low: 0.25 * optics.screenDistance, high: 2.5 * optics.screenDistance, say: (v) => fixed(v, 0) + " mm", two: false },
   { group: "Screen", name: "screenSize", words: "Size", start: 1, low: 0.5, high: 4,
-    say: (v) => fixed(v * optics.size[0], 0) + " × " + fixed(v * optics.size[1], 0) + " mm" },
+    say: (v, s) => screenAt(optics, s).size.map((size) => fixed(v * size, 0)).join(" × ") + " mm" },
   { group: "Screen", name: "tiltRight", words: "Tilt, upper edge", start: 0, low: -60, high: 60, say: (v) => fixed(v, 1) + "°" },
   { group: "Screen", name: "tiltUp", words: "Tilt, right edge", start: 0, low: -60, high: 60, say: (v) => fixed(v, 1) + "°" },
   { group: "Lamp", name: "lampDistance", words: "Distance", start: optics.distance, low: 0, high: 1,
@@ -40,7 +42,7 @@ const kControls = [
   { group: "Lens", name: "wavelength", words: "Wavelength", start: 587.56, low: 400, high: 700,
     say: (v, s) => fixed(v, 0) + " nm, index " + fixed(indexAt(s.index, s.abbe, v), 4), lens: true },
   { group: "Eye", name: "exposure", words: "Exposure", start: 0, low: -4, high: 4, say: (v) => signed(v, 1) + " stops" },
-].filter((control) => !(control.lens && optics.mirror));
+].filter((control) => !(control.lens && optics.mirror) && (control.two ?? !!optics.second) === !!optics.second);
 const kDefaults = { abbe: data.abbe, surface: data.surfaces[0].id, index: optics.index, wavelength: 587.56 };
 for (const control of kControls) kDefaults[control.name] = control.start;
 const settings = { ...kDefaults };
@@ -68,15 +70,21 @@ function chosenSurface() {
   if (!decoded.has(stored.id)) decoded.set(stored.id, decodeSurface(stored, data.setup.lens_size));
   return decoded.get(stored.id);
 }
-const asDesigned = () => Object.keys(kDefaults).every((name) =>
-  kOnlyShown.has(name) || name === "surface" || settings[name] === kDefaults[name]);
+// What a screen between two is compared with: 0 or 1, the nearer one's picture.
+const nearer = () => (settings.between >= 0.5 ? 1 : 0);
+const target = () => targets[nearer()];
+// True if the program has a picture of these settings: on its second screen, of the design alone.
+const asDesigned = () => Object.keys(kDefaults).every((name) => {
+  if (name === "between" && settings.between === 1) return settings.surface === kDefaults.surface;
+  return kOnlyShown.has(name) || name === "surface" || settings[name] === kDefaults[name];
+});
 // The program's own picture of the surface that is shown.
 const programsPicture = () => pictureOf(stepsTo(settings.surface).pop().picture);
 // True if the page shows the program's picture because its own would differ too much.
 const onlyStored = () => asDesigned() && !swing && !shownOf().exact;
 
 function halves() {
-  return optics.size.map((size) => 0.5 * size * settings.screenSize);
+  return screenAt(optics, settings).size.map((size) => 0.5 * size * settings.screenSize);
 }
 
 // The program's picture is shown until the page's own is drawn.
@@ -108,7 +116,9 @@ function onePass() {
 // Light relative to white in the picture: evenly spread it would be as bright as the target's mean.
 // A larger screen spreads the same even light thinner.
 function gain() {
-  return data.white / settings.screenSize ** 2;
+  const share = settings.between || 0;
+  const white = share > 0 ? (1 - share) * data.white + share * data.second.white : data.white;
+  return white / settings.screenSize ** 2;
 }
 
 function frame() {
@@ -160,14 +170,15 @@ function meanError(a, b) {
 }
 
 function compare() {
-  const errors = new Float32Array(target.length);
-  for (let i = 0; i < errors.length; ++i) errors[i] = Math.abs(encoded(drawn[i]) - encoded(target[i]));
+  const wanted = target(), errors = new Float32Array(wanted.length);
+  for (let i = 0; i < errors.length; ++i) errors[i] = Math.abs(encoded(drawn[i]) - encoded(wanted[i]));
+  paintTarget();
   const mean = errors.reduce((a, b) => a + b, 0) / errors.length;
   const top = roundedUp(Math.max(1e-3, errors.slice().sort()[Math.floor(0.995 * (errors.length - 1))]));
   paint(find("difference"), (i) => data.colors[Math.round(255 * Math.min(1, errors[i] / top))]);
   find("top").textContent = String(top);
   find("difference-note").textContent = `between light and target, display values 0 … 1; mean ${fixed(mean, 4)}`;
-  let said = `MAE ${fixed(mean, 4)} from the target`;
+  let said = `MAE ${fixed(mean, 4)} from the ${kWhich[nearer()]}target`;
   lensView.error = asDesigned() ? meanError(drawn, programsPicture()) : null;
   if (onlyStored()) {
     said += `. This is the program's picture ${shownOf().words}; what the page draws once a control is ` +
@@ -182,6 +193,13 @@ function roundedUp(value) {
   const decade = 10 ** Math.floor(Math.log10(value));
   const step = [1, 2, 5, 10].find((s) => value <= s * decade * (1 + 1e-9));
   return Number((step * decade).toPrecision(1));
+}
+
+const kWhich = optics.second ? ["first ", "second "] : [""];
+function paintTarget() {
+  const wanted = target();
+  paint(find("target"), (i) => { const v = Math.round(255 * encoded(wanted[i])); return [v, v, v]; });
+  find("target-note").textContent = `the ${kWhich[nearer()]}picture that was asked for`;
 }
 
 function paint(canvas, color) {
@@ -225,18 +243,20 @@ function grouped(found) {
   return groups.sort((a, b) => b.light - a.light);
 }
 
-const stepsTo = (id) => data.chain.slice(0, 1 + data.chain.findIndex((step) => step.surface === id));
+const stepsTo = (id) => (nearer() ? [data.second]
+  : data.chain.slice(0, 1 + data.chain.findIndex((step) => step.surface === id)));
 // What each step from the target to the light as drawn adds at a pixel.
 function causesAt(pixel) {
   const causes = [];
-  let before = target[pixel];
+  let before = target()[pixel];
   for (const step of stepsTo(settings.surface)) {
     const now = pictureOf(step.picture)[pixel];
     causes.push([step.cause, now - before]);
     before = now;
   }
   if (onlyStored()) return causes;
-  causes.push([asDesigned() ? "the drawing in this page" : "your settings", drawn[pixel] - before]);
+  const others = nearer() && settings.surface !== kDefaults.surface ? "the part and your settings" : "your settings";
+  causes.push([asDesigned() ? "the drawing in this page" : others, drawn[pixel] - before]);
   return causes;
 }
 
@@ -261,7 +281,7 @@ function probe() {
   const main = causes.reduce((a, b) => (Math.abs(b[1]) > Math.abs(a[1]) ? b : a));
   const places = shown.map((g) => `x ${fixed(g.x, 1)}, y ${fixed(g.y, 1)} mm (${fixed(100 * g.light / light, 0)} %)`);
   const from = places.length ? "Its light leaves the lens at " + places.join("; ") + "." : "No light comes here.";
-  const difference = drawn[pixel] - target[pixel];
+  const difference = drawn[pixel] - target()[pixel];
   find("probe").hidden = false;
   const words = find("probe-words");
   words.replaceChildren();
@@ -279,7 +299,7 @@ function probe() {
     add("td", name, tr);
     add("td", value, tr).className = "number";
   };
-  line("light that the target asks for, of white", fixed(target[pixel], 4));
+  line("light that the target asks for, of white", fixed(target()[pixel], 4));
   for (const [cause, value] of causes) line(cause, signed(value, 4));
   line("light as drawn", fixed(drawn[pixel], 4));
   lensView.spot = { groups: shown, causes, text: words.textContent };

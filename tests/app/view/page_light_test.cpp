@@ -189,6 +189,64 @@ TEST_P(PageLight, IsTheProgramsPicture) {
   EXPECT_GT(compare(moved, lens.render).mae, 2.0 * error);
 }
 
+/// The bumpy lens with a second, larger screen far behind the first.
+Lens lens_of_two_screens(bool turned) {
+  Lens lens = bumpy_lens({"AlongZ", along_z}, SurfaceModel::kSmooth);
+  OpticalSetup far = lens.setup;
+  if (turned) turned_screen(far);
+  lens.setup.second = {300.0, 1.4 * kSize, {-1.0, -5.0}, far.screen_x, far.screen_y};
+  lens.second = {Image(48, 40, 0.6F), {}, {}};
+  evaluate(lens.surface, on_second_screen(lens.setup), lens.model, lens.second->target,
+           &lens.second->render, Executor::cpu(2));
+  return lens;
+}
+
+/// The picture half-way between the two screens, which are not turned.
+Image half_way(const Lens& lens) {
+  OpticalSetup setup = lens.setup;
+  const SecondScreen& far = *setup.second;
+  setup.focal_length = 0.5 * (setup.focal_length + far.focal_length);
+  setup.image_size = 0.5 * (setup.image_size + far.image_size);
+  setup.image_origin = 0.5 * (setup.image_origin + far.image_origin);
+  Image picture;
+  evaluate(lens.surface, setup, lens.model, Image(48, 40, 0.5F), &picture, Executor::cpu(2));
+  return picture;
+}
+
+TEST(PageScreens, MoveFromTheFirstPictureToTheSecond) {
+  if (!testing::has_browser()) GTEST_SKIP() << "chromium is not installed";
+  for (const bool turned : {false, true}) {
+    const Lens lens = lens_of_two_screens(turned);
+    const testing::TempFolder folder;
+    testing::write_bytes(folder / "view.html",
+                         view_page(view_of_lens(lens, "two", Executor::cpu(2))));
+    const PageRun run = testing::run_page(
+        folder / "view.html",
+        "const see = async () => { await lensView.finished(); return { error: lensView.error, "
+        "picture: Array.from(lensView.picture()), "
+        "said: document.querySelector('[data-said]').textContent }; };"
+        "const slider = document.querySelector('input[type=range]'); const seen = [await see()];"
+        "for (let i = 0; i < 100; ++i) { if (i === 50) seen.push(await see());"
+        "slider.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight' })); }"
+        "seen.push(await see()); return { seen, words: slider.getAttribute('aria-valuetext') };");
+    EXPECT_EQ(run.error, "");
+    EXPECT_TRUE(run.console.empty()) << run.console.front();
+    ASSERT_TRUE(run.result.is_object());
+    EXPECT_EQ(run.result["words"], "z = 300 mm");
+    const nlohmann::json& seen = run.result["seen"];
+    const Image own[] = {lens.render, half_way(lens), lens.second->render};
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (turned && k == 1) continue;
+      const Image drawn = picture_of(seen[k]["picture"], own[k]);
+      EXPECT_LT(compare(drawn, own[k]).mae, 0.001) << k;
+      EXPECT_GT(compare(drawn, own[(k + 1) % 3]).mae, 0.01) << k;
+    }
+    EXPECT_TRUE(seen[1]["error"].is_null());
+    EXPECT_LT(seen[2]["error"].get<double>(), 0.001);
+    EXPECT_NE(seen[2]["said"].get<std::string>().find("from the second target"), std::string::npos);
+  }
+}
+
 /// A spline whose knots are not even, so steep that its light folds over.
 Lens folding_spline() {
   Lens lens = bumpy_lens({"AlongZ", along_z}, SurfaceModel::kSmooth);

@@ -104,6 +104,25 @@ TEST(Checkpoint, ComesBackToTheBit) {
   EXPECT_EQ(after.convergence[2].mae, 1.0 / 7.0);
 }
 
+TEST(Checkpoint, BothFacesComeBackToTheBit) {
+  const TempFolder folder;
+  for (const bool from_planes : {true, false}) {
+    Checkpoint before = sample();
+    before.from_planes = from_planes;
+    before.front = Eigen::MatrixXd::Random(5, 4) / 3.0;  // One sample at each knot of 7 × 6 points.
+    write_checkpoint(before, folder / "checkpoint");
+    const Checkpoint after = read_checkpoint(folder / "checkpoint");
+    EXPECT_EQ(after.front, before.front);
+    EXPECT_EQ(after.from_planes, from_planes);
+    EXPECT_EQ(after.mesh.vertices, before.mesh.vertices);
+    EXPECT_EQ(after.scales.reach, before.scales.reach);
+  }
+  const std::string bytes = testing::read_bytes(folder / "checkpoint");
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"rows\":6", "\"rows\":5")), HasSubstr("vertices"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, "\"from_planes\"", "\"from_plants\"")),
+              HasSubstr("vertices"));
+}
+
 TEST(Checkpoint, AFileIsThatOfEarlierVersions) {
   const TempFolder folder;
   Checkpoint checkpoint = sample();
