@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -103,6 +104,14 @@ void add_views(py::class_<LensObject, std::shared_ptr<LensObject>>& type) {
       "target", [](const Lens& lens) -> auto& { return lens.target; });
   view(
       "projected", [](const Lens& lens) -> auto& { return lens.render; });
+  const auto second = [&type](const char* name, Image SecondPicture::*picture) {
+    type.def_property_readonly(name, [picture](const py::object& self) -> py::object {
+      const std::optional<SecondPicture>& held = object_of(self).lens().second;
+      return held ? py::object(view_of((*held).*picture, self)) : py::none();
+    });
+  };
+  second("second_target", &SecondPicture::target);
+  second("second_projected", &SecondPicture::render);
 }
 
 bool same(const SurfaceMesh& a, const SurfaceMesh& b) {
@@ -114,6 +123,10 @@ bool same(const SurfaceMesh& a, const SurfaceMesh& b) {
 bool equal(const LensObject& first, const LensObject& second) {
   const Lens& a = first.lens();
   const Lens& b = second.lens();
+  if (a.second.has_value() != b.second.has_value()) return false;
+  if (a.second && (a.second->target != b.second->target || a.second->render != b.second->render)) {
+    return false;
+  }
   return a.model == b.model && a.setup == b.setup && same(a.surface, b.surface) &&
          a.target == b.target && a.render == b.render;
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The commands as functions: what they return, and what they leave in folders."""
 
+import pickle
 import struct
 import tempfile
 import unittest
@@ -34,6 +35,19 @@ class Design(unittest.TestCase):
             self.assertFalse(array.flags.writeable)
         self.assertTrue(np.shares_memory(lens.vertices, lens.vertices))
         self.assertTrue(np.shares_memory(lens.projected, lens.projected))
+
+    def test_a_lens_of_two_pictures_has_both(self):
+        self.assertIsNone(small_lens.lens().second_target)
+        first, second = np.ones((8, 8), np.float32), small_lens.PICTURE
+        lens = lensforge.design(first, second=second, second_focal=90, pixels=8, width=12, thickness=12,
+                                focal=30, quality="draft")
+        self.assertEqual(lens.second_target.shape, (8, 8))
+        self.assertLess(np.abs(lens.second_target - lens.second_projected).mean(), 0.05)
+        self.assertGreater(np.abs(lens.second_target - lens.target).mean(), 0.05)
+        self.assertFalse(lens.second_projected.flags.writeable)
+        again = pickle.loads(pickle.dumps(lens))
+        self.assertEqual(again, lens)
+        np.testing.assert_array_equal(again.second_projected, lens.second_projected)
 
     def test_a_view_outlives_its_lens(self):
         picture = np.ones((8, 8), np.float32)

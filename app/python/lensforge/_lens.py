@@ -141,6 +141,16 @@ class Lens:
         return self._held.projected
 
     @property
+    def second_target(self):
+        """As target, the picture wanted on a second screen; None without one."""
+        return self._held.second_target
+
+    @property
+    def second_projected(self):
+        """As projected, the picture on a second screen; None without one."""
+        return self._held.second_projected
+
+    @property
     def setup(self):
         """Setup: light, screen and picture."""
         return Setup._of(self._held.setup)
