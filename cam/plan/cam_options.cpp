@@ -357,7 +357,7 @@ std::string tolerance_fault(const CamOptions& options, const OpticalSetup& setup
     return "draws parts of one finishing ball only: set finish.large_tool = 0";
   }
   if (setup.outline) return "draws parts of rectangular lenses only";
-  if (options.face == CutFace::kFront) return "draws parts by their back: use it with --face back";
+  if (options.face == CutFace::kFront) return "draws parts whose back is cut";
   // PartModel polishes heights without scallops.
   if (options.workshop.polish.sigma == 0.0) return "draws parts that are polished only";
   return "";

@@ -196,7 +196,7 @@ TEST_P(EveryLight, ACurvedFrontIsInSolidsAndLiesInANest) {
                  {"--z-zero table", "is curved", "stock or lens"});
   if (!sphere) {
     expect_refusal(run({"cam", path("lens"), "--face", "front", "--tolerances", "10"}), 2,
-                   {"--tolerances 10", "by their back", "--tolerances 0"});
+                   {"--tolerances 10", "whose back is cut", "--tolerances 0"});
   }
   EXPECT_FALSE(fs::exists(at("lens/cam")));
 }
