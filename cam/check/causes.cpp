@@ -124,10 +124,12 @@ class DeviationFit {
   [[nodiscard]] bool shows(Deviation deviation, Standing standing) const;
 
  private:
-  [[nodiscard]] WallPicture wall(const Deviations& at) const {
+  /// @param near  deviations whose diffraction it has.
+  [[nodiscard]] WallPicture wall(const Deviations& at, const Deviations& near) const {
     if (control_->stop_requested()) throw Interrupted();
-    return wall_picture(*model_, at);
+    return wall_picture(*model_, at, near);
   }
+  [[nodiscard]] WallPicture wall() const { return wall(at_, at_); }
   /// Change of the picture by one step.
   [[nodiscard]] WallPicture change(Deviation deviation, const WallPicture& from) const;
 
@@ -161,7 +163,7 @@ WallPicture DeviationFit::change(Deviation deviation, const WallPicture& from) c
       deviation == Deviation::kPolish && at_[i] < 0.0 && at_[i] - steps_[i] > limits_.least[i];
   const double way = to_scallops || at_[i] + steps_[i] > limits_.most[i] ? -1.0 : 1.0;
   moved[i] += way * steps_[i];
-  const WallPicture there = wall(moved);
+  const WallPicture there = wall(moved, at_);
   return way > 0.0 ? sum_of(there, -1.0, from) : sum_of(from, -1.0, there);
 }
 
@@ -216,13 +218,13 @@ double DeviationFit::take(const Eigen::VectorXd& parameters) {
 
 void DeviationFit::run() {
   for (int round = 0; round < kMostRounds; ++round) {
-    Line line{wall(at_), {}};
+    Line line{wall(), {}};
     for (const Deviation d : active_) line.changes.push_back(change(d, line.base));
     Eigen::VectorXd start = Eigen::VectorXd::Zero(view::kCount + std::ssize(active_));
     start.head(view::kCount) = view_;
     if (take(minimize(problem(line), start)) < kShortStep) break;
   }
-  left_ = pixels_->shown(view_, wall(at_)) - pixels_->seen();
+  left_ = pixels_->shown(view_, wall()) - pixels_->seen();
 }
 
 bool DeviationFit::shows(Deviation deviation, Standing standing) const {
@@ -233,7 +235,7 @@ bool DeviationFit::shows(Deviation deviation, Standing standing) const {
 }
 
 DeviationFit::Tangents DeviationFit::tangents(Standing standing) const {
-  const WallPicture base = wall(at_);
+  const WallPicture base = wall();
   const Eigen::VectorXd shown = pixels_->shown(view_, base);
   Tangents result{pixels_->seen() - shown, pixels_->derivatives(view_, base),
                   Eigen::MatrixXd::Zero(shown.size(), static_cast<int>(kDeviations))};
@@ -464,8 +466,14 @@ void describe_all(const DeviationFit& fit, const JointTest& test, CauseFit& resu
 
 }  // namespace
 
+WallPicture wall_picture(const WallModel& model, const Deviations& deviations,
+                         const Deviations& near) {
+  return {model.picture(deviations, near), model.margin() * model.fine(),
+          model.log_size(deviations)};
+}
+
 WallPicture wall_picture(const WallModel& model, const Deviations& deviations) {
-  return {model.picture(deviations), model.margin() * model.fine(), model.log_size(deviations)};
+  return wall_picture(model, deviations, deviations);
 }
 
 namespace {

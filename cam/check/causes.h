@@ -44,7 +44,9 @@ struct CauseFit {
 CauseFit find_causes(const WallModel& model, const SeenPixels& pixels, const Eigen::VectorXd& view,
                      const RunControl& control);
 
-/// A predicted picture of the model for a view.
+/// A predicted picture of the model for a view. @param near  as of WallModel::picture().
+WallPicture wall_picture(const WallModel& model, const Deviations& deviations,
+                         const Deviations& near);
 WallPicture wall_picture(const WallModel& model, const Deviations& deviations);
 
 }  // namespace lensforge

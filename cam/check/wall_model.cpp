@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -18,6 +20,7 @@
 #include "core/error.h"
 #include "core/lens/surface_field.h"
 #include "core/optics/light_path.h"
+#include "core/optics/picture_blur.h"
 #include "core/optics/polish_transfer.h"
 #include "design/render.h"
 #include "design/render/source_picture.h"
@@ -181,8 +184,6 @@ struct WallModel::Part {
   std::shared_ptr<const Cut> cut;
   PolishedField polished;
   HeldField held;
-  /// What waves add to its shares of light, lit from a point; empty: by rays.
-  std::vector<double> diffraction;
 };
 
 WallModel::~WallModel() = default;
@@ -213,6 +214,7 @@ WallModel::WallModel(const Lens& lens, const CamOptions& options, int fine,
   const std::int64_t pixels = wide_.pixels.cast<std::int64_t>().prod();
   lights_.most = kept(kKeptPixels / 2, pixels, 2);
   pictures_.most = kept(kKeptPixels, pixels, 4);
+  diffractions_.most = kept(kKeptPixels / 4, pixels, 2);
   if (!fault_.empty()) {
     if (options.light != LightModel::kWaves) return;
     throw InputError("--light-model waves: check " + fault_ +
@@ -292,11 +294,8 @@ std::shared_ptr<const WallModel::Part> WallModel::part(const Deviations& deviati
       deviations[index_of(Deviation::kBall)],
       options_.workshop.process.finish.pitch_error + deviations[index_of(Deviation::kPitch)],
       deviations[index_of(Deviation::kBacklash)]};
-  return parts_.of({polish.sigma, made}, [&] {
-    auto result = std::make_shared<Part>(cut(made), polish, *this);
-    if (by_waves()) result->diffraction = diffraction_of(*result);
-    return result;
-  });
+  return parts_.of({polish.sigma, made},
+                   [&] { return std::make_shared<const Part>(cut(made), polish, *this); });
 }
 
 std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& optics) const {
@@ -310,6 +309,36 @@ std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& op
   return render_field(part.held, render, executor_, silent_).flux;
 }
 
+namespace {
+
+/// A Gaussian over pixels, as blurred() takes it.
+std::vector<double> gaussian_shares(double sigma) {
+  std::vector<double> shares{1.0};
+  double sum = 1.0;
+  for (int k = 1; k <= 3.5 * sigma; ++k) {
+    shares.push_back(std::exp(-0.5 * k * k / (sigma * sigma)));
+    sum += 2.0 * shares.back();
+  }
+  for (double& share : shares) share /= sum;
+  return shares;
+}
+
+std::vector<double> softened(const std::vector<double>& light, const Eigen::Vector2i& pixels,
+                             const std::vector<double>& shares) {
+  Image image(pixels.x(), pixels.y());
+  std::transform(light.begin(), light.end(), image.values().begin(),
+                 [](double value) { return static_cast<float>(value); });
+  image = blurred(image, shares, Beyond::kDark);
+  return {image.values().begin(), image.values().end()};
+}
+
+std::vector<double> difference(std::vector<double> a, const std::vector<double>& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
+  return a;
+}
+
+}  // namespace
+
 void WallModel::choose_light() {
   const double wavelength = middle_wavelength(lens_.setup, kMmPerNm * options_.wavelength_nm);
   FieldRenderSetup planned{lens_.setup, grid_};
@@ -318,16 +347,39 @@ void WallModel::choose_light() {
   waves_.emplace();
   waves_->wavelength = wavelength;
   waves_->scatter = order_angles(wavelength, passes_);
+  const OpticalSetup point = lit_from(wide_, Eigen::Vector2d::Zero());
+  const std::shared_ptr<const Part> made = part(Deviations::Zero());
+  const std::vector<double> rays = light_of(*made, point);
+  const std::vector<double> waves = waves_of(*made, point);
+  const double pixel = wide_.image_size.x() / wide_.pixels.x();
+  const double width = diffraction_width(wide_, height_, wavelength) / pixel;
+  constexpr int kBlurs = 12;
+  constexpr double kStep = 0.05;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k <= kBlurs; ++k) {
+    const std::vector<double> shares = gaussian_shares(kStep * k * width);
+    const std::vector<double> rest = difference(waves, softened(rays, wide_.pixels, shares));
+    const double square = std::inner_product(rest.begin(), rest.end(), rest.begin(), 0.0);
+    if (square >= least) continue;
+    least = square;
+    diffraction_blur_ = shares;
+  }
 }
 
-std::vector<double> WallModel::diffraction_of(const Part& part) const {
-  const OpticalSetup point = lit_from(wide_, Eigen::Vector2d::Zero());
+std::vector<double> WallModel::waves_of(const Part& part, const OpticalSetup& optics) const {
   const SurfaceField* const surface = &part.held;
-  std::vector<double> more =
-      wave_flux(point, grid_, {&surface, 1}, *waves_, executor_, silent_).front();
-  const std::vector<double> by_rays = light_of(part, point);
-  for (std::size_t i = 0; i < more.size(); ++i) more[i] -= by_rays[i];
-  return more;
+  return wave_flux(optics, grid_, {&surface, 1}, *waves_, executor_, silent_).front();
+}
+
+const std::vector<double>& WallModel::diffraction(Deviations at) const {
+  at[index_of(Deviation::kLampSize)] = 0.0;
+  at[index_of(Deviation::kHaze)] = 0.0;
+  return diffractions_.of(at, [&] {
+    const OpticalSetup point = lit_from(optics_of(at), Eigen::Vector2d::Zero());
+    const std::shared_ptr<const Part> made = part(at);
+    return difference(waves_of(*made, point),
+                      softened(light_of(*made, point), wide_.pixels, diffraction_blur_));
+  });
 }
 
 bool WallModel::shows(Deviation deviation) const {
@@ -420,29 +472,33 @@ std::vector<double> in_parts(const std::vector<double>& light, const Eigen::Vect
 
 }  // namespace
 
-std::vector<double> WallModel::clear_flux(const Deviations& deviations) const {
+std::vector<double> WallModel::clear_flux(const Deviations& deviations,
+                                          const Deviations& near) const {
   const OpticalSetup optics = optics_of(deviations);
   if (!has_part()) return flux_of_lens(lens_, optics, executor_);
-  const std::shared_ptr<const Part> made = part(deviations);
-  std::vector<double> flux = light_of(*made, optics);
+  std::vector<double> flux = light_of(*part(deviations), optics);
   if (!by_waves()) return flux;
-  const auto from_point = [&](const OpticalSetup& sharp) {
-    return in_parts(made->diffraction, wide_.pixels, sharp.pixels.x() / wide_.pixels.x());
+  flux = softened(flux, wide_.pixels, diffraction_blur_);
+  const std::vector<double>& rest = diffraction(near);
+  const auto in_detail = [&](const OpticalSetup& sharp) {
+    return in_parts(rest, wide_.pixels, sharp.pixels.x() / wide_.pixels.x());
   };
-  const std::vector<double> more = picture_by_convolution(optics, height_, from_point, executor_);
+  const std::vector<double> more = picture_by_convolution(optics, height_, in_detail, executor_);
   for (std::size_t i = 0; i < flux.size(); ++i) flux[i] += more[i];
   return flux;
 }
 
-Image WallModel::picture(const Deviations& deviations) const {
+Image WallModel::picture(const Deviations& deviations, const Deviations& near) const {
   const Deviations within = within_limits(deviations);
-  return pictures_.of(within, [&] {
+  const Deviations anchor = by_waves() ? within_limits(near) : Deviations::Zero();
+  return pictures_.of({within, anchor}, [&] {
     Deviations clear = within;
     clear[index_of(Deviation::kHaze)] = 0.0;
     const OpticalSetup optics = optics_of(within);
     const std::vector<double> light =
         hazed(haze_at(optics, within[index_of(Deviation::kHaze)]),
-              lights_.of(clear, [&] { return clear_flux(clear); }), optics.pixels, executor_);
+              lights_.of({clear, anchor}, [&] { return clear_flux(clear, anchor); }), optics.pixels,
+              executor_);
     const double even = lens_.setup.pixels.cast<double>().prod() * fine_ * fine_;
     Image image(wide_.pixels.x(), wide_.pixels.y());
     std::transform(light.begin(), light.end(), image.values().begin(),

@@ -64,13 +64,12 @@ std::optional<double> lamp_distance(const OpticalSetup& setup);
 /// Predicts pictures on the wall, with light around the picture's rectangle, by cam's chain: the
 /// finishing rows are planned and fitted once; the balls that they move, with deviations, leave a
 /// surface (MilledField), which is polished (PolishedField) and rendered (render_field(), a lamp
-/// with a width by a convolution). Where light_choice() asks for waves, what these add to a
-/// part's picture on the planned wall in the light of a point is added on other walls and in other
-/// light, too: to first order, since diffraction is a blur of a pixel or so. Where parts cannot be
-/// drawn (tolerance_fault(), creases) it is the lens as designed. Every step is kept and done anew
-/// only for the deviations that it depends on: a cut by ball, pitch error and backlash, a part by
-/// these and its polish, its light by these, the lamp and the wall. Not for several threads at
-/// once.
+/// with a width by a convolution). Where light_choice() asks for waves, a picture by
+/// rays is blurred by the Gaussian that brings the planned part's nearest to that by waves, and
+/// what then is missing in the light of a point is added. Where parts cannot be drawn
+/// (tolerance_fault(), creases) it is the lens as designed. Every step is kept and done anew only
+/// for the deviations that it depends on: a cut by ball, pitch error and backlash, a part by these
+/// and its polish, its light by these, the lamp and the wall. Not for several threads at once.
 class WallModel {
  public:
   /// @param lens  must outlive this. @param options  with the workshop.
@@ -84,7 +83,12 @@ class WallModel {
 
   /// Irradiance relative to all light spread evenly over the picture. Deviations beyond
   /// deviation_limits() count as these. @throw Interrupted once the constructor's control stops
-  [[nodiscard]] Image picture(const Deviations& deviations) const;
+  /// @param near  deviations close by, whose picture has the same diffraction: by waves that is
+  ///              most of the time.
+  [[nodiscard]] Image picture(const Deviations& deviations, const Deviations& near) const;
+  [[nodiscard]] Image picture(const Deviations& deviations) const {
+    return picture(deviations, deviations);
+  }
   /// ln of the size of that picture's pixels, in planned ones: those of another lamp's distance
   /// grow with the shadow of the lens, in which details keep their places.
   [[nodiscard]] double log_size(const Deviations& deviations) const;
@@ -143,12 +147,16 @@ class WallModel {
   [[nodiscard]] std::shared_ptr<const Part> part(const Deviations& deviations) const;
   /// Shares of the light of a part.
   [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
-  [[nodiscard]] std::vector<double> diffraction_of(const Part& part) const;
+  /// The same by waves.
+  [[nodiscard]] std::vector<double> waves_of(const Part& part, const OpticalSetup& optics) const;
+  /// What waves add to blurred rays in the light of the lamp's middle.
+  [[nodiscard]] const std::vector<double>& diffraction(Deviations at) const;
   [[nodiscard]] Deviations within_limits(const Deviations& deviations) const;
   [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
   [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
   /// Shares of the light, of the lens as designed where there is no part, and without haze.
-  [[nodiscard]] std::vector<double> clear_flux(const Deviations& deviations) const;
+  [[nodiscard]] std::vector<double> clear_flux(const Deviations& deviations,
+                                               const Deviations& near) const;
   [[nodiscard]] bool is_kept_whole() const;
 
   const Lens& lens_;
@@ -160,15 +168,19 @@ class WallModel {
   double blank_top_ = 0.0;
   Passes passes_;
   std::string fault_;
-  std::vector<BallRows> rows_;        ///< Empty if there is no part.
-  GridWindow grid_;                   ///< On which parts are sampled, if there is one.
-  std::optional<WaveOptions> waves_;  ///< If the light goes as waves.
+  std::vector<BallRows> rows_;            ///< Empty if there is no part.
+  GridWindow grid_;                       ///< On which parts are sampled, if there is one.
+  std::optional<WaveOptions> waves_;      ///< If the light goes as waves.
+  std::vector<double> diffraction_blur_;  ///< As blurred() takes it; of waves.
   Executor executor_;
   RunControl silent_;  ///< Stops what is computed later.
   mutable Kept<CutKey, std::shared_ptr<const Cut>> cuts_;
   mutable Kept<std::pair<double, CutKey>, std::shared_ptr<const Part>> parts_;
-  mutable Kept<Deviations, std::vector<double>> lights_;
-  mutable Kept<Deviations, Image> pictures_;
+  /// By deviations, and by those whose diffraction it is.
+  using PictureKey = std::pair<Deviations, Deviations>;
+  mutable Kept<PictureKey, std::vector<double>> lights_;
+  mutable Kept<PictureKey, Image> pictures_;
+  mutable Kept<Deviations, std::vector<double>> diffractions_;
 };
 
 }  // namespace lensforge
