@@ -91,7 +91,7 @@ std::string words_of(const FoundCause& cause, const Lens& lens, const CamOptions
 /// "by the chart the picture is 104.1 ± 0.2 mm wide, planned 100 mm"
 std::string words_of(const ChartFinding& chart, const Lens& lens);
 /// CauseFit::systematic up to which a photograph counts as explained: about twice the most that was
-/// left on the virtual wall where all causes were found (docs/check.md).
+/// left on the virtual wall but where a cause was missed (docs/check.md).
 inline constexpr double kMostSystematic = 0.003;
 /// What is wrong, in a sentence: that of the likeliest cause, or that nothing shows; and whether
 /// that explains the photograph.
