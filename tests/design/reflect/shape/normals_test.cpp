@@ -71,8 +71,8 @@ TEST(FixedSteps, AFaceThatHasLostItsAreaKeepsANormal) {
   mesh.vertices.col(mesh.triangles(1, 0)) = mesh.vertices.col(mesh.triangles(0, 0));
   const Eigen::VectorXd share = measure_faces(mesh).area_share();
   ASSERT_EQ(share.minCoeff(), 0.0);
-  const PathEstimator estimator(mesh, make_light_field(ReflectOptions{}), Loss::kSquare,
-                                Executor::cpu(2));
+  const LightField field = make_light_field(ReflectOptions{});
+  const PathEstimator estimator(mesh, field, Loss::kSquare, Executor::cpu(2));
   const Eigen::Matrix3Xd normals =
       stepped_normals(estimator, {reference, 0.1}, share, reference, 8, 1);
   EXPECT_LT((normals.colwise().norm().array() - 1.0).abs().maxCoeff(), 1e-12);
