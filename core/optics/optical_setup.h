@@ -305,6 +305,9 @@ struct WaveOptions {
   /// piece.
   double tile = 24.0;
   double overlap = 8.0;
+  /// Pixels by which light may stray where a screen is tilted against its tile; beyond, a tile's
+  /// light is found on several planes.
+  double stray = 0.25;
 };
 
 /// What blurs a picture, and by how much.

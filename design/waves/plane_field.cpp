@@ -303,6 +303,16 @@ void PlaneField::gather_rest(std::span<double> by_path) {
   pending_.clear();
 }
 
+PlaneField PlaneField::to_plane(double way) const {
+  PlaneField there = *this;
+  there.plan_ = plan_.beyond(way);
+  return there;
+}
+
+void PlaneField::add(const PlaneField& other) {
+  for (std::size_t n = 0; n < values_.size(); ++n) values_[n] += other.values_[n];
+}
+
 void PlaneField::propagate() {
   lay_rest();
   go(false);
@@ -409,7 +419,8 @@ class NodesOnPixels {
         divergence_(plan.divergence()),
         cell_((to.by_mm * step_.asDiagonal()).cwiseAbs().rowwise().sum()),
         along_(step_.x() *
-               (Eigen::ArrayXd::LinSpaced(plan.columns, 0.0, plan.columns - 1) - middle_.x())) {
+               (Eigen::ArrayXd::LinSpaced(plan.columns, 0.0, plan.columns - 1) - middle_.x())),
+        is_alone_(to.before == HUGE_VAL && to.behind == HUGE_VAL) {
     Eigen::AlignedBox2d box;
     for (const int j : {0, plan.rows / 2, plan.rows}) {
       for (const int i : {0, plan.columns / 2, plan.columns}) box.extend(lands(i, j));
@@ -428,7 +439,7 @@ class NodesOnPixels {
   void go_to(int j) {
     const double across = (j - middle_.y()) * step_.y();
     const double wider = divergence_.y() * across;
-    way_ = -(to_.tilt.x() * along_ + to_.tilt.y() * across) /
+    way_ = -(to_.way + to_.tilt.x() * along_ + to_.tilt.y() * across) /
            (1.0 + (to_.tilt.x() * divergence_.x() * along_ + to_.tilt.y() * wider));
     const auto moved_along = along_ + way_ * divergence_.x() * along_;
     const auto moved_across = across + way_ * wider;
@@ -436,6 +447,8 @@ class NodesOnPixels {
     x_ = from.x() + to_.by_mm(0, 0) * moved_along + to_.by_mm(0, 1) * moved_across;
     y_ = from.y() + to_.by_mm(1, 0) * moved_along + to_.by_mm(1, 1) * moved_across;
   }
+  /// Of the light of the row's node that lands from this plane.
+  [[nodiscard]] double share(int i) const { return is_alone_ ? 1.0 : to_.share(way_[i]); }
 
   /// Calls `take(number, share)` for the pixels that the cell of the row's node touches; numbers
   /// count from `low`, row by row.
@@ -460,7 +473,7 @@ class NodesOnPixels {
   [[nodiscard]] Eigen::Vector2d lands(int i, int j) const {
     const Eigen::Vector2d at = (Eigen::Vector2d(i, j) - middle_).cwiseProduct(step_);
     const Eigen::Vector2d wider = divergence_.cwiseProduct(at);
-    const double way = -to_.tilt.dot(at) / (1.0 + to_.tilt.dot(wider));
+    const double way = -(to_.way + to_.tilt.dot(at)) / (1.0 + to_.tilt.dot(wider));
     return to_.centre + to_.by_mm * (at + way * wider);
   }
   [[nodiscard]] std::size_t number(int column, int row) const {
@@ -485,6 +498,7 @@ class NodesOnPixels {
   Eigen::Vector2d middle_, divergence_;
   Eigen::Vector2d cell_;  ///< Pixels.
   Eigen::ArrayXd along_;  ///< Of the nodes of a row from the middle, mm.
+  bool is_alone_;         ///< All light lands from this plane.
   Eigen::ArrayXd way_;
   Eigen::ArrayXd x_, y_;  ///< Where the cells of a row begin, pixel coordinates.
 };
@@ -504,7 +518,7 @@ PixelLight PlaneField::spread(const OnPicture& to) const {
   for (int j = 0; j < plan_.rows; ++j) {
     on.go_to(j);
     for (int i = 0; i < plan_.columns; ++i) {
-      const double light = static_cast<double>(std::norm(at(i, j))) * area;
+      const double light = static_cast<double>(std::norm(at(i, j))) * area * on.share(i);
       if (light == 0.0) continue;
       on.for_each_pixel(
           i, [&](std::size_t pixel, double share) { result.light[pixel] += share * light; });
@@ -528,7 +542,7 @@ void PlaneField::pull(const OnPicture& to, std::span<const double> by_pixel) {
       if (!on.none()) {
         on.for_each_pixel(i, [&](std::size_t pixel, double share) { bar += share * bars[pixel]; });
       }
-      at(i, j) *= static_cast<float>(doubled_area * bar);
+      at(i, j) *= static_cast<float>(doubled_area * bar * on.share(i));
     }
   }
 }

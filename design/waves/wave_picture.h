@@ -56,7 +56,8 @@ GridWindow wave_grid(const OpticalSetup& setup, const OpticalSurface& surface);
 /// every branch adds its field with its own optical path, and −π/2 beyond a fold. The field, of
 /// amplitude √(light per area), goes to the screen by the angular spectrum (Goodman, Introduction
 /// to Fourier Optics, section 3.10) without the phases of the mean ray and of the rays' common
-/// curvature (laid_ray()), and the tiles' intensities are added. Waves of points farther apart than
+/// curvature (laid_ray()), on a screen that is tilted against it to several planes (OnPicture), and
+/// the tiles' intensities are added. Waves of points farther apart than
 /// about λ f / pixel do not interfere in a pixel's mean, so windows that overlap more than that
 /// change nothing but the speed; WavePicture.* bound the error against one piece by 2e-4 MAE.
 ///

@@ -47,6 +47,11 @@ constexpr double kLeastUse = 0.6;
 /// A tile that needs so many times more nodes than before has strayed: it is not followed.
 constexpr double kMostGrowth = 8.0;
 
+/// By how much light may stray from a plane to the next, in pixels or √(λ f), whichever is more:
+/// what lands between them is a mixture of both. And the most planes on either side.
+constexpr double kPlaneStep = 0.1;
+constexpr double kMostPlaneSteps = 8.0;
+
 /// From this share of the steepest direction kept on, waves fade into rays.
 constexpr double kFade = 0.8;
 
@@ -94,8 +99,8 @@ class WaveTile {
   /// True if no light leaves.
   [[nodiscard]] bool is_dark() const { return whole_ <= 0.0; }
 
-  /// The tile's field on the screen.
-  [[nodiscard]] PlaneField on_screen() const {
+  /// Its field on the planes at the screen.
+  [[nodiscard]] std::vector<PlaneField> on_planes() const {
     PlaneField field(plan_.field);
     if (has_edge()) {
       for_each_laid([&](const auto& corners, const auto& indices) {
@@ -104,27 +109,36 @@ class WaveTile {
     }
     for_each_laid(
         [&](const auto& corners, const auto& indices) { field.add(corners, where(indices)); });
-    field.propagate();
-    return field;
+    field.lay_rest();
+    std::vector<PlaneField> planes;
+    for (int k = 0; k + 1 < plan_.planes; ++k) planes.push_back(field.to_plane(plan_.way_to(k)));
+    planes.push_back(plan_.planes == 1 ? std::move(field)
+                                       : field.to_plane(plan_.way_to(plan_.planes - 1)));
+    for (PlaneField& plane : planes) plane.propagate();
+    return planes;
   }
 
   /// Each node's light is spread over its cell, along the mean ray.
-  /// @param field  on_screen()
-  [[nodiscard]] PixelLight light(const PlaneField& field) const {
-    const OnPicture to = on_picture();
-    PixelLight light = field.spread(to);
-    light.whole = whole_;
-    if (as_rays_ > 0.0) add_rays(light);
-    return light;
+  /// @param planes  on_planes() @return of each plane.
+  [[nodiscard]] std::vector<PixelLight> light(const std::vector<PlaneField>& planes) const {
+    std::vector<PixelLight> all;
+    for (const PlaneField& plane : planes) all.push_back(plane.spread(on_picture(all.size())));
+    all.front().whole = whole_;
+    if (as_rays_ > 0.0) add_rays(all.front());
+    return all;
   }
 
   /// Calls `take(column, row, derivative)` for all nodes: tile_heights_bar().
-  /// @param field  on_screen()
+  /// @param planes  on_planes()
   template <class Take>
-  void heights_bar(PlaneField field, std::span<const double> by_pixel, const Take& take) const {
-    const OnPicture to = on_picture();
-    field.pull(to, by_pixel);
-    field.return_back();
+  void heights_bar(std::vector<PlaneField> planes, std::span<const double> by_pixel,
+                   const Take& take) const {
+    for (std::size_t k = 0; k < planes.size(); ++k) {
+      planes[k].pull(on_picture(k), by_pixel);
+      planes[k].return_back();
+      if (k > 0) planes.front().add(planes[k]);
+    }
+    PlaneField& field = planes.front();
     std::vector<double> by_path(nodes_.size(), 0.0);
     for_each_laid([&](const auto& corners, const auto& indices) {
       field.gather(corners, where(indices), indices, by_path);
@@ -460,6 +474,31 @@ class WaveTile {
       plan_.steepest *= 0.9;
       plan_nodes(now.start);
     }
+    plan_planes();
+  }
+
+  /// One plane, or so many that light that strays goes a short way from the nearest to the screen.
+  void plan_planes() {
+    const FieldPlan& field = plan_.field;
+    const OnPicture to = on_picture();
+    double farthest = 0.0;  // mm
+    double most = 0.0;      // Pixels.
+    for (const Node& node : nodes_) {
+      if (!is_bright(node)) continue;
+      const Eigen::Vector2d at = field.magnification.cwiseProduct(landing(node));
+      const Eigen::Vector2d wider = field.divergence().cwiseProduct(at);
+      const double way = std::abs(to.tilt.dot(at) / (1.0 + to.tilt.dot(wider)));
+      const Eigen::Vector2d slope = (landing(node) - from_centre(node)) / field.distance;
+      farthest = std::max(farthest, way);
+      most = std::max(most, way * (to.by_mm * slope).lpNorm<Eigen::Infinity>());
+    }
+    plan_.planes = 1;
+    if (most <= options_.stray) return;
+    const double spot = std::sqrt(color_.wavelength * field.distance);
+    const double step = kPlaneStep * std::max(1.0, to.by_mm.col(0).norm() * spot);
+    const double steps = std::min(std::ceil(most / step), kMostPlaneSteps);
+    plan_.planes = 1 + 2 * static_cast<int>(steps);
+    plan_.apart = farthest / steps;
   }
 
   /// The magnification with which the field has the fewest nodes.
@@ -626,6 +665,15 @@ class WaveTile {
     return color_.light.land(frame.point(place, level), slope_of(frame.axes.col(2)));
   }
 
+  /// Of a plane of the plan.
+  [[nodiscard]] OnPicture on_picture(std::size_t plane) const {
+    OnPicture to = on_picture();
+    to.way = plan_.way_to(static_cast<int>(plane));
+    if (plane > 0) to.before = plan_.apart;
+    if (static_cast<int>(plane) + 1 < plan_.planes) to.behind = plan_.apart;
+    return to;
+  }
+  /// Of the plane that meets the screen in its centre.
   [[nodiscard]] OnPicture on_picture() const {
     const FieldPlan& field = plan_.field;
     const double far = plan_.frame.level + field.distance;
@@ -693,9 +741,10 @@ std::vector<PixelLight> tile_light(const WaveScene& scene, const WaveColor& colo
                                    TileMemory* memory) {
   std::vector<PixelLight> parts;
   for_each_part(scene, color, nodes, tile, memory, [&](const WaveTile& part) {
-    PlaneField field = part.on_screen();
-    parts.push_back(part.light(field));
-    if (memory != nullptr && memory->keeps_fields) memory->fields.push_back(std::move(field));
+    std::vector<PlaneField> planes = part.on_planes();
+    for (PixelLight& light : part.light(planes)) parts.push_back(std::move(light));
+    if (memory == nullptr || !memory->keeps_fields) return;
+    for (PlaneField& plane : planes) memory->fields.push_back(std::move(plane));
   });
   return parts;
 }
@@ -710,10 +759,16 @@ std::vector<double> tile_heights_bar(const WaveScene& scene, const WaveColor& co
          static_cast<std::size_t>(column - tile.x.begin)] += bar;
   };
   std::vector<PlaneField> kept = std::exchange(memory.fields, {});
-  std::size_t next = 0;
+  auto next = std::make_move_iterator(kept.begin());
   for_each_part(scene, color, nodes, tile, &memory, [&](const WaveTile& part) {
-    PlaneField field = kept.empty() ? part.on_screen() : std::move(kept[next++]);
-    part.heights_bar(std::move(field), by_pixel, add);
+    std::vector<PlaneField> planes;
+    if (kept.empty()) {
+      planes = part.on_planes();
+    } else {
+      planes.assign(next, next + part.plan().planes);
+      next += part.plan().planes;
+    }
+    part.heights_bar(std::move(planes), by_pixel, add);
   });
   return bars;
 }

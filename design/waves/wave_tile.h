@@ -49,6 +49,14 @@ struct FieldPlan {
   /// Column and row of the centre.
   [[nodiscard]] Eigen::Vector2i centre_node() const { return Eigen::Vector2i(columns, rows) / 2; }
   [[nodiscard]] Eigen::Vector2d middle() const { return centre_node().cast<double>(); }
+  /// The same field's to a plane farther along by `way`, mm.
+  [[nodiscard]] FieldPlan beyond(double way) const {
+    FieldPlan there = *this;
+    there.distance += way;
+    const Eigen::Vector2d wider = magnification - Eigen::Vector2d::Ones();
+    there.magnification = Eigen::Vector2d::Ones() + there.distance / distance * wider;
+    return there;
+  }
   /// How the slopes of rays that keep to magnified places change along the other plane, 1/mm.
   [[nodiscard]] Eigen::Vector2d divergence() const {
     return (Eigen::Vector2d::Ones() - magnification.cwiseInverse()) / distance;
@@ -60,14 +68,23 @@ struct FieldPlan {
 int transform_size(double least);
 inline constexpr double kMostTransform = 1e7;
 
-/// How a plane's light lands on a picture, whose screen it meets in its centre. Light at a place x
-/// from there goes the way t = −tilt·x / (1 + tilt·(divergence x)) to the screen, where it is at
-/// centre + by_mm (1 + t divergence) x.
+/// How a plane's light lands on a picture. Light at a place x from the plane's centre goes the way
+/// t = −(way + tilt·x) / (1 + tilt·(divergence x)) to the screen, where it is at centre + by_mm (1
+/// + t divergence) x. Light that is far from a common magnification strays on it, by t times how
+/// its slope differs; so that of planes `apart` from each other is mixed, linearly by t.
 struct OnPicture {
   Eigen::Vector2d centre;          ///< Pixel coordinates of the field's centre.
   Eigen::Matrix2d by_mm;           ///< Their derivatives, along the normal.
   Eigen::Vector2i pixels;          ///< Columns and rows of the picture.
   Eigen::Vector2d tilt{0.0, 0.0};  ///< Slopes of the plane against the screen.
+  double way = 0.0;                ///< Of the centre from the screen, along the normal, mm.
+  /// To the plane before and behind, mm; none: this one has all the light there.
+  double before = HUGE_VAL, behind = HUGE_VAL;
+
+  /// Share of this plane in light with a way to the screen.
+  [[nodiscard]] double share(double t) const {
+    return std::max(0.0, 1.0 - (t < 0.0 ? -t / before : t / behind));
+  }
 };
 
 /// Light of a rectangle of pixels.
@@ -110,6 +127,8 @@ class PlaneField {
   enum class Where { kInside, kAtEdge };
 
   explicit PlaneField(const FieldPlan& plan);
+  /// The same field, to go to a plane farther along by `way`, mm. @pre not propagated.
+  [[nodiscard]] PlaneField to_plane(double way) const;
 
   /// Of a field with a hard edge, before the first of add(), its triangles at the edge and those
   /// that share nodes' cells with them: such cells have as much of their node's field as is lit of
@@ -139,6 +158,8 @@ class PlaneField {
   void gather(const std::array<Corner, 3>& corners, Where where,
               const std::array<std::size_t, 3>& vertex, std::span<double> by_path);
   void gather_rest(std::span<double> by_path);
+  /// Adds the values of another field on the first plane. @pre the same nodes.
+  void add(const PlaneField& other);
 
   /// Light of the nodes on pixels, each spread evenly over its cell.
   [[nodiscard]] PixelLight spread(const OnPicture& to) const;
@@ -339,6 +360,11 @@ struct TilePlan {
   Eigen::Vector2d start{0.0, 0.0};  ///< Farthest that rays may start from the field's centre, mm.
   Eigen::Vector2d far{0.0, 0.0};    ///< The same where they land, before magnification.
   FieldPlan field;
+  int planes = 1;      ///< On which the field is found, around that of `field`.
+  double apart = 0.0;  ///< Of neighbours, mm.
+
+  /// Of a plane from that of `field`, mm.
+  [[nodiscard]] double way_to(int plane) const { return (plane - planes / 2) * apart; }
 };
 
 /// What is kept of a tile from one look at its surface to the next.

@@ -89,8 +89,9 @@ double weighted(const std::vector<double>& flux, const std::vector<double>& w) {
 /// where the size of a field does: heights and steps are such that none is near.
 constexpr double kBump = -1e-4;
 
-double by_difference(const OpticalSetup& setup, const Eigen::Vector2d& middle) {
-  NodeWaves waves = waves_of(setup, {.tile = 0.0}, 2);
+double by_difference(const OpticalSetup& setup, const Eigen::Vector2d& middle,
+                     const WaveOptions& options = {.tile = 0.0}) {
+  NodeWaves waves = waves_of(setup, options, 2);
   const auto value = [&](double height) {
     const BumpedNodes nodes(height, middle);
     return weighted(waves.look(nodes.positions.data(), nodes.normals.data()), weights());
@@ -125,6 +126,17 @@ TEST(NodeWaves, AdjointIsTheDerivative) {
       EXPECT_NEAR(by_adjoint(setup, {.tile = 5.0, .overlap = 3.0}, middle), difference,
                   0.05 * std::abs(difference));
     }
+  }
+}
+
+/// On several planes.
+TEST(NodeWaves, AdjointOnATiltedScreenIsTheSlopeOfTheLight) {
+  OpticalSetup tilted = small_setup();
+  tilted.screen_x = {std::cos(0.6), 0.0, std::sin(0.6)};
+  for (const Eigen::Vector2d& middle : {Eigen::Vector2d(1.3, 1.7), Eigen::Vector2d(0.3, 2.5)}) {
+    const WaveOptions options{.tile = 0.0, .stray = 0.0};
+    const double difference = by_difference(tilted, middle, options);
+    EXPECT_NEAR(by_adjoint(tilted, options, middle), difference, 0.01 * std::abs(difference));
   }
 }
 
