@@ -32,6 +32,9 @@ namespace {
 /// Beyond each side of the picture: light of a wall that is 15 % off, and some of the haze's.
 constexpr double kMargin = 0.12;
 
+/// WaveOptions::stray: a tilt of the wall is found by less than what a picture shows of it.
+constexpr double kStray = 0.002;
+
 /// Greatest polish that is looked for, in multiples of the workshop's.
 constexpr double kMostPolish = 2.5;
 
@@ -311,18 +314,6 @@ std::vector<double> WallModel::light_of(const Part& part, const OpticalSetup& op
 
 namespace {
 
-/// A Gaussian over pixels, as blurred() takes it.
-std::vector<double> gaussian_shares(double sigma) {
-  std::vector<double> shares{1.0};
-  double sum = 1.0;
-  for (int k = 1; k <= 3.5 * sigma; ++k) {
-    shares.push_back(std::exp(-0.5 * k * k / (sigma * sigma)));
-    sum += 2.0 * shares.back();
-  }
-  for (double& share : shares) share /= sum;
-  return shares;
-}
-
 std::vector<double> softened(const std::vector<double>& light, const Eigen::Vector2i& pixels,
                              const std::vector<double>& shares) {
   Image image(pixels.x(), pixels.y());
@@ -347,6 +338,7 @@ void WallModel::choose_light() {
   waves_.emplace();
   waves_->wavelength = wavelength;
   waves_->scatter = order_angles(wavelength, passes_);
+  waves_->stray = kStray;
   const OpticalSetup point = lit_from(wide_, Eigen::Vector2d::Zero());
   const std::shared_ptr<const Part> made = part(Deviations::Zero());
   const std::vector<double> rays = light_of(*made, point);
@@ -380,6 +372,30 @@ const std::vector<double>& WallModel::diffraction(Deviations at) const {
     return difference(waves_of(*made, point),
                       softened(light_of(*made, point), wide_.pixels, diffraction_blur_));
   });
+}
+
+const std::vector<double>& WallModel::diffraction_change(Deviation deviation) const {
+  std::vector<double>& change = diffraction_changes_[static_cast<std::size_t>(deviation)];
+  if (change.empty()) {
+    const Eigen::Index i = index_of(deviation);
+    Deviations moved = Deviations::Zero();
+    moved[i] = deviation_steps(lens_.setup)[i];
+    const std::vector<double> planned = diffraction(Deviations::Zero());
+    change = difference(diffraction(moved), planned);
+  }
+  return change;
+}
+
+std::vector<double> WallModel::diffraction(const Deviations& at, const Deviations& near) const {
+  std::vector<double> rest = diffraction(near);
+  const Deviations by = (at - near).cwiseQuotient(deviation_steps(lens_.setup));
+  for (std::size_t k = 0; k < kDeviations; ++k) {
+    const auto d = static_cast<Deviation>(k);
+    if (by[index_of(d)] == 0.0 || d == Deviation::kLampSize || d == Deviation::kHaze) continue;
+    const std::vector<double>& change = diffraction_change(d);
+    for (std::size_t i = 0; i < rest.size(); ++i) rest[i] += by[index_of(d)] * change[i];
+  }
+  return rest;
 }
 
 bool WallModel::shows(Deviation deviation) const {
@@ -456,18 +472,33 @@ Haze WallModel::haze_at(const OpticalSetup& optics, double more) const {
 
 namespace {
 
-/// Every pixel as parts × parts equal ones.
-std::vector<double> in_parts(const std::vector<double>& light, const Eigen::Vector2i& pixels,
-                             int parts) {
-  std::vector<double> result;
-  result.reserve(light.size() * static_cast<std::size_t>(parts * parts));
-  for (int row = 0; row < parts * pixels.y(); ++row) {
-    for (int column = 0; column < parts * pixels.x(); ++column) {
-      const int pixel = row / parts * pixels.x() + column / parts;
-      result.push_back(light[static_cast<std::size_t>(pixel)] / (parts * parts));
+/// Columns as `parts` each, of the parabola with the means of a column and of its neighbours.
+Eigen::ArrayXXd columns_in_parts(const Eigen::ArrayXXd& light, int parts) {
+  Eigen::ArrayXXd result(light.rows(), parts * light.cols());
+  for (Eigen::Index c = 0; c < light.cols(); ++c) {
+    const auto mean = light.col(c);
+    const auto before = light.col(std::max<Eigen::Index>(c - 1, 0));
+    const auto after = light.col(std::min(c + 1, light.cols() - 1));
+    const Eigen::ArrayXd slope = 0.5 * (after - before);
+    const Eigen::ArrayXd bend = after - 2.0 * mean + before;
+    for (int k = 0; k < parts; ++k) {
+      const double from = double{1} * k / parts - 0.5;
+      const double to = from + 1.0 / parts;
+      const double square = (from * from + from * to + to * to) / 3.0;
+      result.col(parts * c + k) =
+          (mean + 0.5 * (from + to) * slope + (0.5 * square - 1.0 / 24.0) * bend) / parts;
     }
   }
   return result;
+}
+
+/// Every pixel as parts × parts. Even ones would blur the light once more, by their width.
+std::vector<double> in_parts(const std::vector<double>& light, const Eigen::Vector2i& pixels,
+                             int parts) {
+  const Eigen::Map<const Eigen::ArrayXXd> columns(light.data(), pixels.x(), pixels.y());
+  const Eigen::ArrayXXd split = columns_in_parts(columns, parts).transpose();
+  const Eigen::ArrayXXd all = columns_in_parts(split, parts).transpose();
+  return {all.data(), all.data() + all.size()};
 }
 
 }  // namespace
@@ -476,16 +507,16 @@ std::vector<double> WallModel::clear_flux(const Deviations& deviations,
                                           const Deviations& near) const {
   const OpticalSetup optics = optics_of(deviations);
   if (!has_part()) return flux_of_lens(lens_, optics, executor_);
-  std::vector<double> flux = light_of(*part(deviations), optics);
-  if (!by_waves()) return flux;
-  flux = softened(flux, wide_.pixels, diffraction_blur_);
-  const std::vector<double>& rest = diffraction(near);
+  if (!by_waves()) return light_of(*part(deviations), optics);
+  const OpticalSetup point = lit_from(optics, Eigen::Vector2d::Zero());
+  std::vector<double> light =
+      softened(light_of(*part(deviations), point), wide_.pixels, diffraction_blur_);
+  const std::vector<double> rest = diffraction(deviations, near);
+  for (std::size_t i = 0; i < light.size(); ++i) light[i] += rest[i];
   const auto in_detail = [&](const OpticalSetup& sharp) {
-    return in_parts(rest, wide_.pixels, sharp.pixels.x() / wide_.pixels.x());
+    return in_parts(light, wide_.pixels, sharp.pixels.x() / wide_.pixels.x());
   };
-  const std::vector<double> more = picture_by_convolution(optics, height_, in_detail, executor_);
-  for (std::size_t i = 0; i < flux.size(); ++i) flux[i] += more[i];
-  return flux;
+  return picture_by_convolution(optics, height_, in_detail, executor_);
 }
 
 Image WallModel::picture(const Deviations& deviations, const Deviations& near) const {

@@ -64,12 +64,13 @@ std::optional<double> lamp_distance(const OpticalSetup& setup);
 /// Predicts pictures on the wall, with light around the picture's rectangle, by cam's chain: the
 /// finishing rows are planned and fitted once; the balls that they move, with deviations, leave a
 /// surface (MilledField), which is polished (PolishedField) and rendered (render_field(), a lamp
-/// with a width by a convolution). Where light_choice() asks for waves, a picture by
-/// rays is blurred by the Gaussian that brings the planned part's nearest to that by waves, and
-/// what then is missing in the light of a point is added. Where parts cannot be drawn
-/// (tolerance_fault(), creases) it is the lens as designed. Every step is kept and done anew only
-/// for the deviations that it depends on: a cut by ball, pitch error and backlash, a part by these
-/// and its polish, its light by these, the lamp and the wall. Not for several threads at once.
+/// with a width by a convolution). Where light_choice() asks for waves, the picture by rays of the
+/// lamp's middle is blurred by the Gaussian that brings the planned part's nearest to that by
+/// waves, what then is missing is added, and all convolved with the lamp. Where parts cannot be
+/// drawn (tolerance_fault(), creases) it is the lens as designed. Every step is kept and done anew
+/// only for the deviations that it depends on: a cut by ball, pitch error and backlash, a part by
+/// these and its polish, its light by these, the lamp and the wall. Not for several threads at
+/// once.
 class WallModel {
  public:
   /// @param lens  must outlive this. @param options  with the workshop.
@@ -83,8 +84,8 @@ class WallModel {
 
   /// Irradiance relative to all light spread evenly over the picture. Deviations beyond
   /// deviation_limits() count as these. @throw Interrupted once the constructor's control stops
-  /// @param near  deviations close by, whose picture has the same diffraction: by waves that is
-  ///              most of the time.
+  /// @param near  deviations close by: from theirs the diffraction is taken to first order, with
+  ///              its changes around the forecast, since waves are most of a picture's time.
   [[nodiscard]] Image picture(const Deviations& deviations, const Deviations& near) const;
   [[nodiscard]] Image picture(const Deviations& deviations) const {
     return picture(deviations, deviations);
@@ -151,6 +152,10 @@ class WallModel {
   [[nodiscard]] std::vector<double> waves_of(const Part& part, const OpticalSetup& optics) const;
   /// What waves add to blurred rays in the light of the lamp's middle.
   [[nodiscard]] const std::vector<double>& diffraction(Deviations at) const;
+  /// Its change by one of deviation_steps() from the forecast.
+  [[nodiscard]] const std::vector<double>& diffraction_change(Deviation deviation) const;
+  /// The same to first order, from that of deviations close by.
+  [[nodiscard]] std::vector<double> diffraction(const Deviations& at, const Deviations& near) const;
   [[nodiscard]] Deviations within_limits(const Deviations& deviations) const;
   [[nodiscard]] OpticalSetup optics_of(const Deviations& deviations) const;
   [[nodiscard]] Haze haze_at(const OpticalSetup& optics, double more) const;
@@ -181,6 +186,7 @@ class WallModel {
   mutable Kept<PictureKey, std::vector<double>> lights_;
   mutable Kept<PictureKey, Image> pictures_;
   mutable Kept<Deviations, std::vector<double>> diffractions_;
+  mutable std::array<std::vector<double>, kDeviations> diffraction_changes_;  ///< Once asked for.
 };
 
 }  // namespace lensforge

@@ -65,6 +65,21 @@ bool waves_show(const std::vector<PictureBlur>& blurs) {
   return blurs[0].pixels <= kWideSource * blurs[1].pixels;
 }
 
+std::vector<double> gaussian_shares(double sigma) {
+  if (sigma == 0.0) return {1.0};
+  const auto integral = [sigma](double x) {  // Of the normal distribution.
+    const double u = x / sigma;
+    return 0.5 * x * (1.0 + std::erf(u / std::numbers::sqrt2)) +
+           sigma * std::exp(-0.5 * u * u) / std::sqrt(2.0 * std::numbers::pi);
+  };
+  std::vector<double> shares;
+  shares.reserve(static_cast<std::size_t>(3.0 + 4.0 * sigma));
+  for (int away = 0; away < 2.0 + 4.0 * sigma; ++away) {
+    shares.push_back(integral(away + 1.0) - 2.0 * integral(away) + integral(away - 1.0));
+  }
+  return shares;
+}
+
 Image blurred(const Image& picture, std::span<const double> shares, Beyond beyond) {
   const int reach = static_cast<int>(shares.size()) - 1;
   const auto along = [&](const Image& from, bool rows) {
@@ -110,22 +125,6 @@ constexpr double kMaxSigma = 32.0;
 /// Mean error of values that are rounded to the 255 steps of a display.
 constexpr double kDisplayFloor = 0.25 / 255.0;
 
-/// Shares of a pixel's light, even over the pixel, that a Gaussian blur leaves 0, 1, 2 … pixels
-/// away. @param sigma  pixels, > 0.
-std::vector<double> pixel_shares(double sigma) {
-  const auto integral = [sigma](double x) {  // Of the normal distribution.
-    const double u = x / sigma;
-    return 0.5 * x * (1.0 + std::erf(u / std::numbers::sqrt2)) +
-           sigma * std::exp(-0.5 * u * u) / std::sqrt(2.0 * std::numbers::pi);
-  };
-  std::vector<double> shares;
-  shares.reserve(static_cast<std::size_t>(3.0 + 4.0 * sigma));
-  for (int away = 0; away < 2.0 + 4.0 * sigma; ++away) {
-    shares.push_back(integral(away + 1.0) - 2.0 * integral(away) + integral(away - 1.0));
-  }
-  return shares;
-}
-
 }  // namespace
 
 double picture_floor(const Image& target, const OpticalSetup& setup, double z, double wavelength) {
@@ -133,8 +132,9 @@ double picture_floor(const Image& target, const OpticalSetup& setup, double z, d
   if (!waves_show(blurs)) return kDisplayFloor;
   const double lamp = std::min(kDiscSigma * blurs[0].pixels, kMaxSigma);
   const double diffraction = std::min(kDiffractionSigma * blurs[1].pixels, kMaxSigma);
-  const Image lit = lamp > 0.0 ? blurred(target, pixel_shares(lamp), Beyond::kDark) : target;
-  const Image seen = blurred(target, pixel_shares(std::hypot(lamp, diffraction)), Beyond::kDark);
+  const Image lit = blurred(target, gaussian_shares(lamp), Beyond::kDark);
+  const std::vector<double> shares = gaussian_shares(std::hypot(lamp, diffraction));
+  const Image seen = blurred(target, shares, Beyond::kDark);
   return std::hypot(compare(seen, lit).mae, kDisplayFloor);
 }
 

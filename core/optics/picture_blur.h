@@ -50,6 +50,10 @@ inline constexpr double kWideSource = 3.0;
 /// What lies beyond the sides of a picture that is blurred.
 enum class Beyond { kDark, kMirrored };
 
+/// Shares of a pixel's light, even over the pixel, that a Gaussian blur leaves in it and brings 1,
+/// 2 … pixels to either side. @param sigma  pixels, ≥ 0.
+std::vector<double> gaussian_shares(double sigma);
+
 /// The picture, blurred along rows and columns.
 /// @param shares  of a pixel's light that stay and that go 1, 2 … pixels to either side.
 Image blurred(const Image& picture, std::span<const double> shares, Beyond beyond);
