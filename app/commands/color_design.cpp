@@ -31,7 +31,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kLampNames{"red", "green", "blue"};
 constexpr const char* kColorPicture = "color.png";
 constexpr const char* kColorTarget = "color_target.png";
 constexpr const char* kColorJson = "color.json";
@@ -53,34 +52,6 @@ void require_three_lamps(const OptionSet& options, const DesignSettings& setting
                      ": does not go with --color three-lamps, whose lamps are those of --lamps; "
                      "leave one out");
   }
-}
-
-/// The picture's share for each lamp, and the picture itself in the lenses' pixels.
-struct ColorTarget {
-  LampSplit split;
-  std::vector<std::string> changes;
-  std::array<Image, 3> rgb;
-};
-
-ColorTarget read_color_target(CommandFrame& frame, const DesignSettings& settings) {
-  frame.begin_file();
-  const RunControl control = frame.control();
-  LoadedColors loaded =
-      read_colors(settings.target, control, settings.design.pixels, settings.background);
-  ColorTarget target{
-      split_by_lamps(loaded.light, settings.color.lamps), std::move(loaded.changes), {}};
-  const Image& one = loaded.light[0];
-  const Eigen::Vector2i size =
-      working_size(one.columns(), one.rows(),
-                   std::min(settings.design.pixels, std::max(one.columns(), one.rows())));
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (!(target.split.lamps.pictures[k].total() > 0.0)) {
-      throw InputError(settings.target + ": has nothing for the " + kLampNames[k] +
-                       " lamp; with fewer colours --color grey and a lamp of that colour works");
-    }
-    target.rgb[k] = resample(loaded.light[k], size.x(), size.y(), control);
-  }
-  return target;
 }
 
 /// Distance between the lenses' middles, mm.
@@ -138,8 +109,8 @@ double mean_of(const std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-/// What the three lenses project together.
-struct ColorResult {
+/// Three pictures added up, beside the one that is wanted.
+struct ColorSum {
   LampPictures lamps;           ///< As projected.
   std::vector<float> wanted;    ///< Tristimulus values of the picture.
   std::vector<float> reached;   ///< Those of the sum.
@@ -152,8 +123,8 @@ struct ColorResult {
   }
 };
 
-ColorResult together(const ColorTarget& target, const std::array<Lens, 3>& lenses) {
-  ColorResult result{target.split.lamps, tristimulus(target.rgb), {}, {}};
+ColorSum together(const ColorTarget& target, const std::array<Lens, 3>& lenses) {
+  ColorSum result{target.split.lamps, tristimulus(target.rgb), {}, {}};
   for (std::size_t k = 0; k < 3; ++k) result.lamps.pictures[k] = lenses[k].render;
   result.reached = tristimulus(result.lamps);
   result.distance = color_differences(result.wanted, result.reached);
@@ -199,7 +170,7 @@ Image moved(const Image& picture, double by) {
 }
 
 /// Measures a fault. A wall's scale and a lamp's blur are left out: they are small beside it.
-Parting parted(const ColorResult& result, const std::array<double, 3>& moves) {
+Parting parted(const ColorSum& result, const std::array<double, 3>& moves) {
   const auto difference = [&](double units) {
     LampPictures lamps = result.lamps;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -223,7 +194,7 @@ struct Registration {
 };
 
 Registration registration_of(const DesignSettings& settings, const Lens& lens,
-                             const ColorResult& result) {
+                             const ColorSum& result) {
   const double pixel = lens.setup.image_size.x() / lens.setup.pixels.x();
   const double beyond = settings.design.focal_length - settings.design.thickness;
   const double by_wall = 0.01 * pitch_of(settings) / pixel;
@@ -232,7 +203,7 @@ Registration registration_of(const DesignSettings& settings, const Lens& lens,
 }
 
 nlohmann::json color_json(const DesignSettings& settings, const ColorTarget& target,
-                          const std::array<Lens, 3>& lenses, const ColorResult& result,
+                          const std::array<Lens, 3>& lenses, const ColorSum& result,
                           const Registration& fault) {
   const std::array<double, 3> watts = shares_of(target.split.lamps, true);
   const std::array<double, 3> lumens = shares_of(target.split.lamps, false);
@@ -267,7 +238,7 @@ std::string parting_text(const std::string& what, const Parting& fault, const st
 }
 
 std::string color_text(const DesignSettings& settings, const ColorTarget& target,
-                       const std::array<Lens, 3>& lenses, const ColorResult& result,
+                       const std::array<Lens, 3>& lenses, const ColorSum& result,
                        const Registration& fault) {
   const std::array<double, 3> watts = shares_of(target.split.lamps, true);
   std::string text;
@@ -298,25 +269,63 @@ std::string nest_words(const DesignSettings& settings, const fs::path& out, cons
          shell_word((out / "cut").string());
 }
 
+}  // namespace
+
+ColorTarget color_target(const OptionSet& options, const DesignSettings& settings,
+                         const LoadedColors& loaded, const RunControl& control) {
+  require_three_lamps(options, settings);
+  ColorTarget target{split_by_lamps(loaded.light, settings.color.lamps), loaded.changes, {}};
+  const Image& one = loaded.light[0];
+  const Eigen::Vector2i size =
+      working_size(one.columns(), one.rows(),
+                   std::min(settings.design.pixels, std::max(one.columns(), one.rows())));
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!(target.split.lamps.pictures[k].total() > 0.0)) {
+      throw InputError(settings.target + ": has nothing for the " + kLampNames[k] +
+                       " lamp; with fewer colours --color grey and a lamp of that colour works");
+    }
+    target.rgb[k] = resample(loaded.light[k], size.x(), size.y(), control);
+  }
+  return target;
+}
+
+void settle_lamp(OptionSet& options, DesignSettings& settings, const ColorTarget& target,
+                 std::size_t lamp, const RunControl& control) {
+  settings.changes = lamp == 0 ? target.changes : std::vector<std::string>();
+  settle(options, settings, target.split.lamps.pictures[lamp], control);
+  move_to_lamp(settings, {target.rgb[lamp].columns(), target.rgb[lamp].rows()},
+               settings.color.lamps[lamp], static_cast<int>(lamp) - 1);
+}
+
+ColorResult color_result(const DesignSettings& settings, const ColorTarget& target,
+                         const std::array<Lens, 3>& lenses) {
+  const ColorSum sum = together(target, lenses);
+  const Registration fault = registration_of(settings, lenses[0], sum);
+  const int columns = lenses[0].setup.pixels.x();
+  const int rows = lenses[0].setup.pixels.y();
+  return {color_json(settings, target, lenses, sum, fault),
+          color_text(settings, target, lenses, sum, fault),
+          color_picture(sum.wanted, columns, rows), color_picture(sum.reached, columns, rows)};
+}
+
+namespace {
+
 /// Compares the sum of three finished lenses with the picture and writes both.
 CommandResult add_up(const DesignSettings& settings, const fs::path& out,
                      const ColorTarget& target) {
   std::array<Lens, 3> lenses;
   for (std::size_t k = 0; k < 3; ++k) lenses[k] = read_lens(out / kLampNames[k]);
-  const ColorResult result = together(target, lenses);
-  const Registration fault = registration_of(settings, lenses[0], result);
-  nlohmann::json json = color_json(settings, target, lenses, result, fault);
-  const int columns = lenses[0].setup.pixels.x();
-  const int rows = lenses[0].setup.pixels.y();
+  const ColorResult result = color_result(settings, target, lenses);
   const std::string record =
-      nlohmann::json{{"program", program_mark()}, {"color", json}}.dump(2) + "\n";
-  write_image(color_picture(result.wanted, columns, rows), out / kColorTarget);
-  write_image(color_picture(result.reached, columns, rows), out / kColorPicture);
+      nlohmann::json{{"program", program_mark()}, {"color", result.figures}}.dump(2) + "\n";
+  write_image(result.wanted, out / kColorTarget);
+  write_image(result.reached, out / kColorPicture);
   write_whole_file(out / kColorJson, record);
+  nlohmann::json json = result.figures;
   json["out"] = out.string();
   json["status"] = "done";
   return {json,
-          out.string() + ": three lenses\n" + color_text(settings, target, lenses, result, fault),
+          out.string() + ": three lenses\n" + result.text,
           kDone,
           {},
           {"look at " + (out / kColorPicture).string() +
@@ -326,7 +335,6 @@ CommandResult add_up(const DesignSettings& settings, const fs::path& out,
 }  // namespace
 
 CommandResult run_three_lamps(CommandFrame& frame, DesignSettings& settings) {
-  require_three_lamps(frame.options(), settings);
   const fs::path out = settings.out;
   const EarlierDesign here = EarlierDesign::in(out);
   if (here.lens || here.checkpoint) {
@@ -338,15 +346,16 @@ CommandResult run_three_lamps(CommandFrame& frame, DesignSettings& settings) {
     earlier[k] = EarlierDesign::in(out / kLampNames[k]);
     refuse_to_overwrite(out / kLampNames[k], earlier[k], settings.resume, settings.force);
   }
-  const ColorTarget target = read_color_target(frame, settings);
+  frame.begin_file();
+  const ColorTarget target = color_target(
+      frame.options(), settings,
+      read_colors(settings.target, frame.control(), settings.design.pixels, settings.background),
+      frame.control());
   for (std::size_t k = 0; k < 3; ++k) {
-    settings.changes = k == 0 ? target.changes : std::vector<std::string>();
-    LoadedImage one{target.split.lamps.pictures[k], {}};
+    const LoadedImage one{target.split.lamps.pictures[k], {}};
     frame.begin_file();
-    settle(frame.options(), settings, one.image, frame.control());
+    settle_lamp(frame.options(), settings, target, k, frame.control());
     settings.out = (out / kLampNames[k]).string();
-    move_to_lamp(settings, {target.rgb[k].columns(), target.rgb[k].rows()}, settings.color.lamps[k],
-                 static_cast<int>(k) - 1);
     if (k == 0) note_wedge(settings, frame.console());
     frame.console().note(
         joined({kLampNames[k], " lamp, ", number_text(settings.color.lamps[k]), " nm"}));

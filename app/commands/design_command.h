@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,7 +13,10 @@
 #include "app/frame/option_set.h"
 #include "cam/plan/cam_options.h"
 #include "core/compute/executor.h"
+#include "core/image/color.h"
+#include "core/image/image.h"
 #include "core/image/image_io.h"
+#include "core/lens/lens.h"
 #include "design/design.h"
 #include "design/setup/design_options.h"
 
@@ -93,6 +97,38 @@ void write_design(const std::filesystem::path& folder, const DesignResult& resul
 /// @pre settle() @throw InputError, RunError, Interrupted.
 CommandResult design_for(CommandFrame& frame, DesignSettings& settings, const LoadedImage& loaded,
                          const EarlierDesign& earlier);
+
+// A picture in colour, by three lenses with a lamp each.
+
+/// Of the lamps, in the order of ColorOptions::lamps; the names of their lenses' folders.
+inline constexpr std::array kLampNames{"red", "green", "blue"};
+
+/// A coloured picture, and the light of the three lamps that makes it.
+struct ColorTarget {
+  LampSplit split;
+  std::vector<std::string> changes;
+  std::array<Image, 3> rgb;  ///< In the lenses' pixels.
+};
+
+/// Splits a picture by the lamps of settings.color. @throw InputError if they mix no colours, an
+/// option does not go with them, or the picture has nothing for one of them; Interrupted.
+ColorTarget color_target(const OptionSet& options, const DesignSettings& settings,
+                         const LoadedColors& loaded, const RunControl& control);
+
+/// Does settle() for the lens of one lamp, whose picture is target.split.lamps.pictures[lamp], and
+/// sets its light and the place of its picture.
+void settle_lamp(OptionSet& options, DesignSettings& settings, const ColorTarget& target,
+                 std::size_t lamp, const RunControl& control);
+
+/// What the three lenses project together.
+struct ColorResult {
+  nlohmann::json figures;  ///< The `color` of color.json (docs/interface.md).
+  std::string text;        ///< For people.
+  ColorImage wanted;       ///< sRGB.
+  ColorImage reached;
+};
+ColorResult color_result(const DesignSettings& settings, const ColorTarget& target,
+                         const std::array<Lens, 3>& lenses);
 
 /// Designs the three lenses of --color three-lamps into folders of settings.out, and writes the
 /// picture that they project together beside them.

@@ -101,9 +101,9 @@ class Light {
 
 /// The light of a pixel without its alpha. @param channels  of the pixel.
 template <class Number>
-double grey(const Number* pixel, int channels, const Light<Number>& light) {
+double grey(const Number* pixel, int channels, const Light<Number>& light, KeptLight kept) {
   if (channels < 3) return light.of(pixel[0]);
-  return grey_light({light.of(pixel[0]), light.of(pixel[1]), light.of(pixel[2])});
+  return grey_light({light.of(pixel[0]), light.of(pixel[1]), light.of(pixel[2])}, kept);
 }
 
 template <class Number>
@@ -118,19 +118,20 @@ void require_light(std::span<const Number> values, const std::string& name) {
 }
 
 template <class Number>
-Image image_of(const py::array& array, const std::string& name, const Background& background) {
+Image image_of(const py::array& array, const std::string& name, const Background& background,
+               KeptLight kept) {
   const py::array_t<Number, py::array::c_style | py::array::forcecast> numbers(array);
   const std::span<const Number> values(numbers.data(), static_cast<std::size_t>(numbers.size()));
   require_light(values, name);
   const int channels = numbers.ndim() == 2 ? 1 : static_cast<int>(numbers.shape(2));
   const bool has_alpha = channels == 2 || channels == 4;
-  const double behind = background.light();
+  const double behind = background.light(kept);
   const Light<Number> light;
   bool open = false;
   Image image(static_cast<int>(numbers.shape(1)), static_cast<int>(numbers.shape(0)));
   const Number* pixel = values.data();
   for (float& value : image.values()) {
-    const double whole = grey(pixel, channels, light);
+    const double whole = grey(pixel, channels, light, kept);
     const double alpha =
         has_alpha ? static_cast<double>(pixel[channels - 1]) / Light<Number>::kWhite : 1.0;
     if (alpha > 1.0) {
@@ -140,14 +141,16 @@ Image image_of(const py::array& array, const std::string& name, const Background
     value = static_cast<float>(alpha * whole + (1.0 - alpha) * behind);
     pixel += channels;
   }
-  if (!open) return image;
+  // A channel may be empty where the picture is not.
+  if (!open || kept != KeptLight::kAll) return image;
   if (const auto reason = hidden_by(image, background)) throw InputError(name + ": " + *reason);
   return image;
 }
 
 }  // namespace
 
-Image image_from(const py::array& array, const std::string& name, const Background& background) {
+Image image_from(const py::array& array, const std::string& name, const Background& background,
+                 KeptLight kept) {
   const char kind = array.dtype().kind();
   const auto bytes = array.dtype().itemsize();
   const bool known = kind == 'f' || (kind == 'u' && bytes <= 2);
@@ -161,9 +164,16 @@ Image image_from(const py::array& array, const std::string& name, const Backgrou
   if (std::max(array.shape(0), array.shape(1)) > kMaxImageSide) {
     refuse(name, array, "sides must be at most " + std::to_string(kMaxImageSide));
   }
-  if (kind == 'f') return image_of<float>(array, name, background);
-  return bytes == 1 ? image_of<std::uint8_t>(array, name, background)
-                    : image_of<std::uint16_t>(array, name, background);
+  if (kind == 'f') return image_of<float>(array, name, background, kept);
+  return bytes == 1 ? image_of<std::uint8_t>(array, name, background, kept)
+                    : image_of<std::uint16_t>(array, name, background, kept);
+}
+
+LoadedColors colors_from(const py::array& array, const std::string& name,
+                         const Background& background) {
+  image_from(array, name, background);  // Its checks are of all light.
+  const auto channel = [&](KeptLight kept) { return image_from(array, name, background, kept); };
+  return {{channel(KeptLight::kRed), channel(KeptLight::kGreen), channel(KeptLight::kBlue)}, {}};
 }
 
 SurfaceMesh mesh_from(const py::array& vertices, const py::array& faces) {

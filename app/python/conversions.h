@@ -34,9 +34,15 @@ using Indices = py::array_t<std::int32_t, py::array::c_style | py::array::forcec
 /// luminance (Rec. 709) in linear light; alpha is straight, 0 to 1 or to the largest value.
 /// @param name        for messages.
 /// @param background  what shows through where alpha is below 1.
+/// @param kept        a channel in place of the luminance.
 /// @throw InputError if it has another shape or type, a value that is negative or not finite, an
 ///        alpha above 1, or shows nothing in front of the background.
-Image image_from(const py::array& array, const std::string& name, const Background& background);
+Image image_from(const py::array& array, const std::string& name, const Background& background,
+                 KeptLight kept = KeptLight::kAll);
+
+/// The same in colour; an array of grey has three equal channels. @throw as image_from().
+LoadedColors colors_from(const py::array& array, const std::string& name,
+                         const Background& background);
 
 /// A mesh from (V, 3) coordinates, mm, and (F, 3) vertex numbers.
 /// @throw InputError if the shapes differ, a coordinate is not finite or a vertex number out of

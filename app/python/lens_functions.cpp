@@ -4,7 +4,9 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -198,6 +200,54 @@ std::shared_ptr<LensObject> design(const py::object& picture, app::OptionValues 
   return made;
 }
 
+// --- design of three lenses, for a lamp each
+
+/// Reports of one lamp's design by its name.
+RunControl control_of_lamp(const RunControl& control, std::size_t lamp) {
+  return {control.stop_token(), [control, lamp](Progress progress) {
+            progress.stage = std::string(app::kLampNames[lamp]) + " lamp, " + progress.stage;
+            control.report(progress);
+          }};
+}
+
+/// The lenses, red, green and blue, and what they project together.
+py::tuple three_lamps(const py::object& picture, app::OptionValues values,
+                      const py::object& progress) {
+  const bool is_array = py::isinstance<py::array>(picture);
+  app::DesignSettings settings;
+  app::OptionSet options("three_lamps", "");
+  options.fields(settings);
+  values.insert({{"TARGET", kArgument}, {"--out", "."}, {"--color", "three-lamps"}});
+  options.take(values);
+  std::optional<LoadedColors> given;
+  if (is_array) given = colors_from(picture, kArgument, settings.background);
+  settings.target = is_array ? kArgument : picture.cast<fs::path>().string();
+  std::vector<std::shared_ptr<LensObject>> made;
+  const nlohmann::json figures = run_released(progress, [&](const RunControl& control) {
+    const app::ColorTarget target = app::color_target(
+        options, settings,
+        given ? *given
+              : read_colors(settings.target, control, settings.design.pixels, settings.background),
+        control);
+    const app::ChosenDevice device = options.device_executor();
+    std::array<Lens, 3> lenses;
+    for (std::size_t lamp = 0; lamp < lenses.size(); ++lamp) {
+      const Image& one = target.split.lamps.pictures[lamp];
+      app::settle_lamp(options, settings, target, lamp, control);
+      require_room_for_design(one.columns(), one.rows(), settings.design,
+                              device.executor.concurrency(), settings.out);
+      DesignResult result =
+          design_lens(one, settings.design, device.executor, control_of_lamp(control, lamp));
+      if (result.status != DesignResult::Status::kDone) throw Interrupted();
+      result.lens.provenance = app::design_provenance(options, device, settings.design, result);
+      lenses[lamp] = result.lens;
+      made.push_back(std::make_shared<LensObject>(LensObject{std::move(result), {}}));
+    }
+    return app::color_result(settings, target, lenses).figures;
+  });
+  return py::make_tuple(made[0], made[1], made[2], object_from(figures));
+}
+
 // --- render
 
 /// Render options for a lens in one colour.
@@ -351,6 +401,15 @@ void add_commands(py::module_& module) {
   module.def("design", [of_design](const py::object& picture, const py::dict& options,
                                    const py::object& progress) {
     return design(picture, of_design.values(options), progress);
+  });
+  const Keywords of_lamps("three_lamps", description_of(app::DesignSettings()),
+                          {"--out", "--live", "--resume", "--force", "--color", "--second",
+                           "--second-focal", "--second-width", "--second-offset", "--second-tilt",
+                           "--lamp", "--wavelength", "--wavelengths"});
+  module.attr("three_lamps_options") = of_lamps.text();
+  module.def("three_lamps", [of_lamps](const py::object& picture, const py::dict& options,
+                                       const py::object& progress) {
+    return three_lamps(picture, of_lamps.values(options), progress);
   });
   RenderOptions usual;
   const Keywords of_render("render", options_of(usual), {}, Keywords::Defaults::kOfALens);

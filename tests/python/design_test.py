@@ -49,6 +49,34 @@ class Design(unittest.TestCase):
         self.assertEqual(again, lens)
         np.testing.assert_array_equal(again.second_projected, lens.second_projected)
 
+    def test_three_lamps_make_a_picture_in_colour(self):
+        rows, columns = np.mgrid[0:16, 0:16] / 15.0
+        picture = np.stack([0.2 + 0.6 * rows, 0.2 + 0.6 * columns, 0.8 - 0.6 * rows], axis=2)
+        options = {"pixels": 16, "width": 12, "focal": 80, "quality": "draft", "threads": 2}
+        made = lensforge.three_lamps(picture, lamp_gap=9, **options)
+        lamps = made.color["lamps"]
+        self.assertEqual([lamp["lens"] for lamp in lamps], ["red", "green", "blue"])
+        self.assertAlmostEqual(sum(lamp["share_of_watts"] for lamp in lamps), 1.0)
+        self.assertLess(made.color["delta_e"]["mean"], 2.0)
+        for lens, lamp in zip(made[:3], lamps):
+            self.assertEqual(lens.projected.shape, (16, 16))
+            setup = lens.setup.to_dict()
+            self.assertEqual(setup["spectrum"]["wavelengths_nm"], [lamp["wavelength_nm"]])
+            # Side by side, with their pictures at one place.
+            self.assertAlmostEqual(setup["image_origin"][0], -lamp["x_mm"])
+        self.assertEqual([lamp["x_mm"] for lamp in lamps], [-21.0, 0.0, 21.0])
+        self.assertGreater(np.abs(made.red.target - made.blue.target).mean(), 0.1)
+
+    def test_three_lamps_refuse_what_has_nothing_for_one(self):
+        red = np.zeros((8, 8, 3), np.uint8)
+        red[..., 0] = 255
+        with self.assertRaisesRegex(lensforge.InputError, "picture: has nothing for the green lamp"):
+            lensforge.three_lamps(red, lamps=(600, 525, 465))
+        with self.assertRaisesRegex(lensforge.InputError, "lamps 465,525,625"):
+            lensforge.three_lamps(red, lamps=(465, 525, 625))
+        with self.assertRaisesRegex(TypeError, "unexpected keyword argument 'second'"):
+            lensforge.three_lamps(red, second="other.png")
+
     def test_a_view_outlives_its_lens(self):
         picture = np.ones((8, 8), np.float32)
         vertices = lensforge.design(picture, rounds=1, quality="draft").vertices

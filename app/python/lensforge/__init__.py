@@ -3,6 +3,7 @@
 
 from ._errors import InputError, MissingFileError, RunError
 from ._functions import (
+    ThreeLenses,
     batch,
     cam,
     check,
@@ -14,6 +15,7 @@ from ._functions import (
     plan,
     reflect,
     render,
+    three_lamps,
     view,
 )
 from ._lens import Lens, Setup, flux_image, flux_image_vjp
@@ -25,6 +27,7 @@ __all__ = [
     "MissingFileError",
     "RunError",
     "Setup",
+    "ThreeLenses",
     "__version__",
     "batch",
     "cam",
@@ -39,6 +42,7 @@ __all__ = [
     "plan",
     "reflect",
     "render",
+    "three_lamps",
     "view",
 ]
 

@@ -4,7 +4,7 @@
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, Union
+from typing import Any, NamedTuple, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -74,9 +74,20 @@ class Lens:
     def save(self, folder: _Path, force: bool = False) -> None: ...
     def _repr_png_(self) -> bytes: ...
 
+class ThreeLenses(NamedTuple):
+    """Lenses for a red, a green and a blue lamp, and what they project together."""
+
+    red: Lens
+    green: Lens
+    blue: Lens
+    color: dict[str, Any]
+
 def design(
     picture: _Path | _Picture | npt.ArrayLike, *, progress: _Progress = None, **options: _Option
 ) -> Lens: ...
+def three_lamps(
+    picture: _Path | _Picture | npt.ArrayLike, *, progress: _Progress = None, **options: _Option
+) -> ThreeLenses: ...
 def render(lens: Lens | _Path, **options: _Option) -> _Linear: ...
 def cam(lens: Lens | _Path, *, progress: _Progress = None, **options: _Option) -> dict[str, Any]: ...
 def export(

@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import tempfile
+import typing
 
 import numpy as np
 
@@ -55,6 +56,31 @@ def design(picture, *, progress=None, **options):
     """
     with function_of(progress) as told:
         return Lens._of(_lensforge.design(_picture(picture), options, told))
+
+
+class ThreeLenses(typing.NamedTuple):
+    """Lenses for a red, a green and a blue lamp, and what they project together."""
+
+    red: Lens
+    green: Lens
+    blue: Lens
+    color: dict
+    """As `color` in color.json: "lamps", "delta_e" (CIEDE2000), "outside", "registration_…"."""
+
+
+@with_options("three_lamps")
+def three_lamps(picture, *, progress=None, **options):
+    """Shapes three lenses, each for a lamp of one wavelength, that project a picture in colour.
+
+    picture, progress: as in design(), but RGB stays colour. The lenses stand side by side from left
+    to right, lamp_gap apart, and their pictures add up at one place. Returns a ThreeLenses: `red`,
+    `green`, `blue`, each a Lens, and `color`, a dict of the lamps' shares of the power, the
+    differences in colour and what faults of registration do to them.
+    Raises InputError, RunError. The options are those of lensforge design for three lamps:
+    """
+    with function_of(progress) as told:
+        *lenses, color = _lensforge.three_lamps(_picture(picture), options, told)
+        return ThreeLenses(*map(Lens._of, lenses), color)
 
 
 @with_options("render")
