@@ -419,6 +419,12 @@ constexpr double kSmoothShare = 0.4;  ///< Of a smooth mesh.
 /// Pictures by waves that an iteration takes: one, with its adjoint that of 1.3 more, and a seventh
 /// more evaluations than iterations.
 constexpr double kWavesPerIteration = 2.6;
+/// Time of a design behind a front that it shapes, over that behind a flat one: every ray has to be
+/// found through the front (64² portrait on 25 mm, wall at 25 and 40 mm: 24 and 22 s for 5.2).
+constexpr double kSharedFrontCost = 4.5;
+/// Of a design for two pictures, per pixel and DesignOptions::iterations (relief and rings of 32²
+/// and 64² on 25 mm: 15 and 64 s; nearly twice where it begins with plane faces).
+constexpr double kTwoPicturesSeconds = 1.5e-4;
 /// Bytes of the fields of waves.
 constexpr double kWaveMemory = 2.5e9;
 
@@ -494,6 +500,11 @@ WorkEstimate estimate_design(int columns, int rows, const DesignOptions& options
     }
     estimate.memory_bytes = kBaseMemory + memory + kPixelMemory * pixels;
     estimate.disk_bytes = kTriangleDisk * triangles + kPixelDisk * pixels;
+  }
+  if (options.light.both_faces) processor *= kSharedFrontCost;
+  if (options.second.picture) {
+    const double pixels = levels.back().pixels.cast<double>().prod();
+    processor = kTwoPicturesSeconds * pixels * options.iterations;
   }
   estimate.seconds = processor / threads;
   return estimate;

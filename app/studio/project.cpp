@@ -9,6 +9,7 @@
 #include <sstream>
 #include <system_error>
 #include <utility>
+#include <variant>
 
 #include "app/batch/batch_job.h"
 #include "app/commands/design_command.h"
@@ -18,7 +19,7 @@
 #include "app/studio/studio_forms.h"
 #include "app/view/lens_view.h"
 #include "cam/cam.h"
-#include "cam/check/check_job.h"
+#include "cam/milled/mould.h"
 #include "cam/proposal/proposal.h"
 #include "cam/report/report_html.h"
 #include "core/error.h"
@@ -29,7 +30,9 @@
 #include "core/io/lens_folder.h"
 #include "core/lens/lens.h"
 #include "core/lens/setup_json.h"
+#include "core/optics/front.h"
 #include "core/optics/picture_blur.h"
+#include "core/page/drawings.h"
 #include "core/page/html_page.h"
 #include "core/schema/json.h"
 #include "core/text/number_text.h"
@@ -43,6 +46,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+using project_file::kCheck;
+using project_file::kView;
+using project_file::kWorkshop;
 
 constexpr const char* kRecord = "studio.json";
 constexpr const char* kFormat = "lensforge.studio";
@@ -50,12 +56,15 @@ constexpr const char* kFormat = "lensforge.studio";
 constexpr const char* kKept = ".studio";
 constexpr const char* kPicture = "picture.png";
 constexpr const char* kPreview = "preview.png";
+/// The second picture's key in the record, and what stands before the names of its files.
+constexpr const char* kSecond = "second";
+constexpr const char* kSecondPrefix = "second-";
+constexpr const char* kNoSecond = "--second: there is no second picture yet; choose one";
 constexpr const char* kPhoto = "photo";
-constexpr const char* kWorkshop = "workshop.toml";
 constexpr const char* kLensPrefix = "lens-";
+/// Steps that are commands of these names, and that of a front's setup.
 constexpr const char* kCam = "cam";
-constexpr const char* kCheck = "check";
-constexpr const char* kView = "view.html";
+constexpr const char* kFrontCam = "cam-front";
 constexpr const char* kEvents = "events.jsonl";
 
 /// Longest side of the picture that a page shows and crops, pixels.
@@ -103,71 +112,6 @@ Image fitted(const Image& image, int side) {
   return resample(image, size.x(), size.y());
 }
 
-std::string modified(const fs::path& file) {
-  std::error_code none;
-  const auto time = fs::last_write_time(file, none);
-  return none ? "0" : std::to_string(std::abs(time.time_since_epoch().count() % 1'000'000'007));
-}
-
-json file_json(const fs::path& file, const std::string& name, const std::string& words,
-               const std::string& address) {
-  std::error_code none;
-  const std::uintmax_t bytes = fs::file_size(file, none);
-  return {{"name", name},
-          {"words", words},
-          {"url", address + "files/" + name + "?" + modified(file)},
-          {"bytes", none ? 0 : bytes}};
-}
-
-/// A file of a folder in words.
-struct NamedContent {
-  const char* name;
-  const char* words;
-};
-
-constexpr NamedContent kLensPictures[] = {{lens_file::kWall, "Light on the wall, as waves"},
-                                          {lens_file::kRenderPng, "Light on the wall"},
-                                          {lens_file::kError, "Error of display values"},
-                                          {lens_file::kSetup, "From the side and from above"}};
-constexpr NamedContent kLensFiles[] = {{lens_file::kSurface, "the surface as a mesh, PLY"},
-                                       {"lens.step", "solid for CAD and CAM, STEP"},
-                                       {"lens.iges", "solid for CAD, IGES"},
-                                       {"lens.stl", "mesh, STL"},
-                                       {"lens.3mf", "mesh, 3MF"},
-                                       {"lens.obj", "mesh, OBJ"},
-                                       {"lens.glb", "mesh, glTF"},
-                                       {lens_file::kOverview, "overview, PNG"},
-                                       {lens_file::kJson, "what it is, JSON"}};
-constexpr NamedContent kPartPictures[] = {{cam_file::kWall, "Light on the wall from the part"},
-                                          {cam_file::kLeakage, "Where light leaks"}};
-constexpr NamedContent kPartFiles[] = {{cam_file::kMilledMesh, "the surface as milled, PLY"},
-                                       {cam_file::kReport, "the report, JSON"}};
-
-constexpr NamedContent kCheckPictures[] = {
-    {check_file::kRectified, "The wall, seen straight on"},
-    {check_file::kForecast, "The forecast of the part"},
-    {check_file::kMap, "Brighter than forecast in red, darker in blue"}};
-
-template <std::size_t N>
-json files_of(const fs::path& folder, const std::string& within, const NamedContent (&names)[N],
-              const std::string& address) {
-  json files = json::array();
-  for (const NamedContent& one : names) {
-    const fs::path file = folder / within / one.name;
-    if (!fs::is_regular_file(file)) continue;
-    files.push_back(file_json(file, within + "/" + one.name, one.words, address));
-  }
-  return files;
-}
-
-/// Metrics by their model's name, as in lens.json; those of the lens's own model.
-json own_metrics(const json& lens) {
-  const json metrics = lens.value("metrics", json::object());
-  return metrics.value(lens.value("model", ""), json::object());
-}
-
-std::string mae_words(double mae) { return "MAE " + decimal_text(mae, 4); }
-
 }  // namespace
 
 bool Project::is_project(const fs::path& folder) {
@@ -175,36 +119,69 @@ bool Project::is_project(const fs::path& folder) {
   return record.is_object() && record.value("format", "") == kFormat;
 }
 
-fs::path Project::create(const fs::path& parent, const std::string& title, std::string_view bytes) {
-  const std::string stem = fs::path(title).stem().string();
-  fs::path folder = free_folder(parent, name_of(stem));
+namespace {
+
+/// Keeps a picture as it came, and what a page shows of it. @param prefix  before the files' names.
+/// @param title  of the file that it was. @return what a record has of it. @throw InputError that
+/// names the title if no picture can be read; then nothing is kept.
+json keep_original(const fs::path& folder, const std::string& prefix, const std::string& title,
+                   std::string_view bytes) {
   const std::string extension = lower_case(fs::path(title).extension().string());
   const bool plain = extension.size() > 1 && is_word(extension.substr(1));
-  const std::string original = "original" + (plain ? extension : std::string());
-  fs::create_directories(folder / kKept);
+  const std::string original = prefix + "original" + (plain ? extension : std::string());
+  const fs::path trial = folder / kKept / original;
+  write_whole_file(trial, bytes);
   try {
-    write_whole_file(folder / original, bytes);
-    const LoadedImage loaded = read_image(folder / original);
-    write_image(grey_picture(fitted(loaded.image, kPreviewSide)), folder / kPreview);
-    const json record{{"format", kFormat},
-                      {"version", 1},
-                      {"title", stem},
-                      {"original", original},
-                      {"changes", loaded.changes},
-                      {"width", loaded.image.columns()},
-                      {"height", loaded.image.rows()},
-                      {"settings", json::object()},
-                      {"workshop", json::object()},
-                      {"current", 0}};
-    write_whole_file(folder / kRecord, record.dump(2) + "\n");
+    const LoadedImage loaded = read_image(trial);
+    write_image(grey_picture(fitted(loaded.image, kPreviewSide)), folder / (prefix + kPreview));
+    fs::rename(trial, folder / original);
+    return {{"title", fs::path(title).stem().string()},
+            {"original", original},
+            {"changes", loaded.changes},
+            {"width", loaded.image.columns()},
+            {"height", loaded.image.rows()}};
   } catch (const InputError& e) {
-    fs::remove_all(folder);
+    fs::remove(trial);
     // The name of the file is the studio's own.
     std::string words = e.what();
-    const std::string path = (folder / original).string();
-    const std::size_t at = words.find(path);
-    if (at != std::string::npos) words.replace(at, path.size(), printable_line(title));
+    const std::size_t at = words.find(trial.string());
+    if (at != std::string::npos) words.replace(at, trial.string().size(), printable_line(title));
     throw InputError(words);
+  }
+}
+
+/// Takes a PNG, or the original if it is empty, as the picture that designs get.
+void take_as_picture(const fs::path& folder, const std::string& prefix, std::string_view bytes,
+                     json& record) {
+  const fs::path place = folder / (prefix + kPicture);
+  const fs::path trial = folder / kKept / kPicture;
+  if (!bytes.empty()) write_whole_file(trial, bytes);
+  const LoadedImage loaded =
+      read_image(bytes.empty() ? folder / record.value("original", "") : trial);
+  if (bytes.empty()) {
+    write_image(loaded.image, place);  // The whole precision of the original.
+  } else {
+    fs::rename(trial, place);
+  }
+  record["size"] = {loaded.image.columns(), loaded.image.rows()};
+}
+
+}  // namespace
+
+fs::path Project::create(const fs::path& parent, const std::string& title, std::string_view bytes) {
+  fs::path folder = free_folder(parent, name_of(fs::path(title).stem().string()));
+  fs::create_directories(folder / kKept);
+  try {
+    json record = keep_original(folder, "", title, bytes);
+    record.update({{"format", kFormat},
+                   {"version", 1},
+                   {"settings", json::object()},
+                   {"workshop", json::object()},
+                   {"current", 0}});
+    write_whole_file(folder / kRecord, record.dump(2) + "\n");
+  } catch (const InputError&) {
+    fs::remove_all(folder);
+    throw;
   }
   return folder;
 }
@@ -295,19 +272,25 @@ void Project::require_picture() const {
 
 void Project::take_picture(std::string_view bytes) {
   require_idle();
-  const fs::path place = folder_ / kPicture;
-  if (bytes.empty()) {
-    // The whole precision of the original, as the program reads it.
-    const LoadedImage loaded = read_image(folder_ / record_.value("original", ""));
-    write_image(loaded.image, place);
-    record_["size"] = {loaded.image.columns(), loaded.image.rows()};
-  } else {
-    const fs::path trial = folder_ / kKept / kPicture;
-    write_whole_file(trial, bytes);
-    const LoadedImage loaded = read_image(trial);
-    fs::rename(trial, place);
-    record_["size"] = {loaded.image.columns(), loaded.image.rows()};
-  }
+  take_as_picture(folder_, "", bytes, record_);
+  save();
+}
+
+void Project::take_second(const std::string& title, std::string_view bytes) {
+  require_idle();
+  json second = keep_original(folder_, kSecondPrefix, title, bytes);
+  take_as_picture(folder_, kSecondPrefix, "", second);
+  const std::string earlier = has_second() ? record_[kSecond].value("original", "") : "";
+  if (!earlier.empty() && earlier != second["original"]) fs::remove(folder_ / earlier);
+  record_[kSecond] = std::move(second);
+  record_["settings"]["--second"] = true;
+  save();
+}
+
+void Project::take_second_picture(std::string_view bytes) {
+  require_idle();
+  if (!has_second()) throw InputError(kNoSecond);
+  take_as_picture(folder_, kSecondPrefix, bytes, record_[kSecond]);
   save();
 }
 
@@ -328,6 +311,7 @@ void Project::take_settings(const json& changes) {
   json record = record_;
   if (changes.contains("settings")) {
     record["settings"] = changed_settings(record["settings"], changes["settings"]);
+    if (record["settings"].value("--second", false) && !has_second()) throw InputError(kNoSecond);
   }
   if (changes.contains("workshop")) {
     record["workshop"] = changed_workshop(record["workshop"], changes["workshop"]);
@@ -346,7 +330,7 @@ Arguments Project::setting_words(bool of_plan) const {
   BatchStep step{"design", json::object()};
   Arguments words;
   for (const auto& [name, value] : record_["settings"].items()) {
-    if (name == "--made-by") continue;
+    if (is_flag_for_file(name)) continue;
     if (of_plan && !is_plan_option(name)) continue;
     step.set(name.substr(2), value);
   }
@@ -355,19 +339,81 @@ Arguments Project::setting_words(bool of_plan) const {
   if (of_plan ? shop : record_["settings"].value("--made-by", false)) {
     words.insert(words.end(), {"--made-by", shop ? kWorkshop : "default"});
   }
+  if (!of_plan && record_["settings"].value("--second", false)) {
+    words.insert(words.end(), {"--second", std::string(kSecondPrefix) + kPicture});
+  }
   return words;
 }
 
-std::string Project::range_fault() const {
+const OpticalSetup* Project::lens_setup() {
   const fs::path file = lens_folder() / lens_file::kJson;
-  const json lens = json_in(file);
-  if (!lens.is_object()) return "there is no lens";
-  CamOptions cut;
-  cut.workshop = workshop_with(record_["workshop"]);
-  return tolerance_fault(cut, read_setup(JsonFields(lens, file.string()), lens_folder()));
+  const std::string read = lens_name() + " " + modified(file);
+  if (read != setup_read_) {
+    setup_.reset();
+    const json lens = json_in(file);
+    setup_read_ = read;
+    try {
+      if (lens.is_object()) setup_ = read_setup(JsonFields(lens, file.string()), lens_folder());
+    } catch (const InputError&) {
+      // The commands that read the lens say what is wrong with it.
+    }
+  }
+  return setup_ ? &*setup_ : nullptr;
 }
 
-Arguments Project::words_of(const std::string& step, const std::string& format) const {
+namespace {
+
+bool is_front_cut(const OpticalSetup& setup) {
+  return setup.front && std::holds_alternative<HeightFront>(*setup.front);
+}
+
+}  // namespace
+
+double Project::frame_margin(const OpticalSetup& setup) {
+  json asked{setup_read_, record_["workshop"]};
+  if (asked != margin_asked_) {
+    CamOptions cut;
+    cut.workshop = workshop_with(record_["workshop"]);
+    frame_margin_ = std::max(cut.workshop.stock.margin, margin_for_frame(cut, setup));
+    margin_asked_ = std::move(asked);
+  }
+  return frame_margin_;
+}
+
+Arguments Project::setup_words(CutFace face, const OpticalSetup& setup) {
+  Arguments words{"--z-zero", "table"};
+  if (face == CutFace::kFront) words = {"--face", "front"};
+  if (!record_["workshop"].contains("stock.margin")) {
+    words.insert(words.end(), {"--margin", number_text(frame_margin(setup)) + "mm"});
+  }
+  // Tabs would hang in the air: the lens is sawn out of its frame.
+  if (face == CutFace::kBack && setup.outline) {
+    words.insert(words.end(), {"--cut-outline", "never"});
+  }
+  return words;
+}
+
+Arguments Project::cut_words(CutFace face) {
+  Arguments words{kCam, lens_name()};
+  const auto add = [&](const Arguments& more) {
+    words.insert(words.end(), more.begin(), more.end());
+  };
+  if (fs::is_regular_file(folder_ / kWorkshop)) add({"--workshop", kWorkshop});
+  // The programs that send takes, unless the workshop states its own.
+  const json& shop = record_["workshop"];
+  if (!shop.contains("machine.post")) add({"--post", "grbl"});
+  const OpticalSetup* const setup = lens_setup();
+  if (setup != nullptr && is_front_cut(*setup)) {
+    add(setup_words(face, *setup));
+  } else if (face == CutFace::kFront) {
+    throw InputError("the front of this lens is flat, as the blank's: there is one setup");
+  }
+  return words;
+}
+
+Arguments Project::words_of(const std::string& step, const std::string& format) {
+  if (step == kCam) return cut_words(CutFace::kBack);
+  if (step == kFrontCam) return cut_words(CutFace::kFront);
   Arguments words{step};
   const auto add = [&](const Arguments& more) {
     words.insert(words.end(), more.begin(), more.end());
@@ -379,11 +425,6 @@ Arguments Project::words_of(const std::string& step, const std::string& format) 
     words.emplace_back(kPicture);
     add(setting_words(false));
     add({"--out", kLensPrefix + std::to_string(next_version())});
-  } else if (step == "cam") {
-    words.push_back(lens_name());
-    if (fs::is_regular_file(folder_ / kWorkshop)) add({"--workshop", kWorkshop});
-    // The programs that send takes, unless the workshop states its own.
-    if (!record_["workshop"].contains("machine.post")) add({"--post", "grbl"});
   } else if (step == kCheck) {
     words.push_back(lens_name());
     add({kPhoto, "--out", lens_name() + "/" + kCheck});
@@ -407,10 +448,11 @@ void Project::start(StudioTask task) {
 
 void Project::run(const json& request) {
   const std::string step = request.value("step", "");
-  static const std::vector<std::string> kSteps{"plan", "design", "cam", "view", "export", kCheck};
+  static const std::vector<std::string> kSteps{"plan", "design", kFrontCam, kCam,
+                                               "view", "export", kCheck};
   if (std::find(kSteps.begin(), kSteps.end(), step) == kSteps.end()) {
     throw InputError("step " + json(step).dump() +
-                     ": must be plan, design, cam, view, export or check");
+                     ": must be plan, design, cam-front, cam, view, export or check");
   }
   const std::string format = request.value("format", "step");
   if (!is_word(format)) {
@@ -463,9 +505,13 @@ void Project::resume() {
 Arguments Project::send_words(const json& request) const {
   const std::string program = request.value("program", "");
   const std::string port = request.value("port", "");
-  const std::string file = lens_name() + "/" + kCam + "/" + program;
-  const bool plain = program.ends_with(".ngc") && program.find('/') == std::string::npos &&
-                     !program.starts_with('.');
+  const std::string of_front = std::string(lens_file::kFrontCut) + "/";
+  const bool front = program.starts_with(of_front);
+  const std::string name = front ? program.substr(of_front.size()) : program;
+  const std::string file =
+      lens_name() + "/" + cut_folder(front ? CutFace::kFront : CutFace::kBack) + "/" + name;
+  const bool plain =
+      name.ends_with(".ngc") && name.find('/') == std::string::npos && !name.starts_with('.');
   if (!plain || !fs::is_regular_file(folder_ / file)) {
     throw InputError("program " + json(program).dump() + ": is none of this lens");
   }
@@ -517,32 +563,39 @@ std::string Project::live_picture(bool error) const {
   return job_ ? job_->live_picture(error) : std::string();
 }
 
-fs::path Project::relief() const {
-  fs::path file = folder_ / kKept / (lens_name() + "-relief.png");
+fs::path Project::relief(CutFace face) const {
+  const bool front = face == CutFace::kFront;
+  fs::path file = folder_ / kKept / (lens_name() + "-" + (front ? kFrontRelief : kRelief));
   if (!fs::is_regular_file(lens_folder() / lens_file::kJson)) throw NotFound{"no lens yet"};
   if (!fs::exists(file)) {
-    const Lens lens = read_lens(lens_folder());
+    Lens lens = read_lens(lens_folder());
+    if (front && !is_front_cut(lens.setup)) throw NotFound{"no shaped front"};
+    if (front) lens = front_lens(lens, 0.0);
     write_image(relief_picture(relief_of(lens), lens.setup.lens_size), file);
   }
   return file;
 }
 
-json Project::picture_json(const std::string& address) const {
-  const fs::path picture = folder_ / kPicture;
+json Project::picture_json(const std::string& prefix, const json& record,
+                           const std::string& address) const {
+  const std::string name = prefix + kPicture;
+  const fs::path picture = folder_ / name;
+  const std::string preview = prefix + kPreview;
   const bool ready = fs::is_regular_file(picture);
-  const json size = record_.value("size", json{0, 0});
-  return {{"original", record_.value("original", "")},
-          {"title", record_.value("title", "")},
-          {"preview", address + "files/" + kPreview},
+  const json size = record.value("size", json{0, 0});
+  return {{"original", record.value("original", "")},
+          {"title", record.value("title", "")},
+          {"preview", address + "files/" + preview + "?" + modified(folder_ / preview)},
           {"ready", ready},
-          {"url", ready ? json(address + "files/" + kPicture + "?" + modified(picture)) : json()},
-          {"width", ready ? size[0] : record_["width"]},
-          {"height", ready ? size[1] : record_["height"]},
-          {"changes", record_.value("changes", json::array())}};
+          {"url", ready ? json(address + "files/" + name + "?" + modified(picture)) : json()},
+          {"width", ready ? size[0] : record["width"]},
+          {"height", ready ? size[1] : record["height"]},
+          {"changes", record.value("changes", json::array())}};
 }
 
 json Project::light_json() {
-  json asked{record_["settings"], record_["workshop"], record_.value("size", json())};
+  json asked{record_["settings"], record_["workshop"], record_.value("size", json()),
+             record_.value(kSecond, json())};
   if (asked != asked_) {
     light_ = computed_light();
     asked_ = std::move(asked);
@@ -566,6 +619,15 @@ json Project::computed_light() const {
     ProposalWish wish;
     wish.design = settings.design;
     wish.cut.workshop = workshop_with(record_["workshop"]);
+    if (record_["settings"].value("--made-by", false)) {
+      wish.design.made_by = made_by(wish.cut, settings.robust);
+    }
+    if (!settings.design.second.file.empty()) {
+      // Only its size counts here.
+      const json& size = record_[kSecond]["size"];
+      wish.design.second.picture =
+          std::make_shared<const Image>(size[0].get<int>(), size[1].get<int>(), 1.0F);
+    }
     const Eigen::Vector2i picture(record_["size"][0].get<int>(), record_["size"][1].get<int>());
     return wish_json(wish, picture);
   } catch (const InputError& e) {
@@ -573,20 +635,23 @@ json Project::computed_light() const {
   }
 }
 
-json Project::commands_json() const {
+json Project::commands_json() {
   json commands = json::object();
   const bool lens = record_.value("current", 0) > 0;
   try {
     for (const char* step : {"plan", "design"}) commands[step] = command_text(words_of(step, ""));
-    for (const char* step : {"cam", "view", "export", kCheck}) {
+    for (const char* step : {kCam, "view", "export", kCheck}) {
       if (lens) commands[step] = command_text(words_of(step, "step"));
+    }
+    if (const OpticalSetup* const setup = lens_setup(); setup != nullptr && is_front_cut(*setup)) {
+      commands[kFrontCam] = command_text(words_of(kFrontCam, ""));
     }
   } catch (const InputError&) {
     // Settings that contradict each other are named by light_json().
   }
   if (lens) {
     commands["send"] =
-        "lensforge send " + lens_name() + "/" + kCam + "/finish.ngc --port " + "sim:grbl@1x";
+        "lensforge send " + lens_name() + "/" + lens_file::kCut + "/finish.ngc --port sim:grbl@1x";
   }
   return commands;
 }
@@ -605,111 +670,17 @@ json Project::plan_json() const {
 }
 
 json Project::lens_json(const std::string& address) const {
-  const std::string name = lens_name();
-  const json lens = json_in(lens_folder() / lens_file::kJson);
-  if (!lens.is_object()) return nullptr;
-  const json result = json_in(folder_ / kKept / (name + ".out"));
-  json words = json::array();
-  const json metrics = own_metrics(lens);
-  const bool waves = result.is_object() && result.contains("waves");
-  const json shown = waves ? result["waves"] : metrics;
-  const double mae = shown.value("mae", 0.0);
-  words.push_back(mae_words(mae) + (waves ? " by waves" : " by rays") + ", PSNR " +
-                  decimal_text(shown.value("psnr", 0.0), 1) + " dB, SSIM " +
-                  decimal_text(shown.value("ssim", 0.0), 3));
-  if (waves) words.push_back(mae_words(metrics.value("mae", 0.0)) + " by rays");
-  if (result.is_object() && result.contains("made")) {
-    words.push_back(mae_words(result["made"].value("mae", 0.0)) +
-                    " as made in the workshop, by rays");
-  }
-  const json provenance = lens.value("provenance", json::object());
-  words.push_back("designed in " + duration_text(provenance.value("seconds", 0.0) / 60.0));
-  const fs::path view = lens_folder() / kView;
-  return {{"version", record_["current"]},
-          {"folder", name},
-          {"mae", mae},
-          {"status", provenance.value("status", "")},
-          {"words", words},
-          {"pictures", files_of(folder_, name, kLensPictures, address)},
-          {"files", files_of(folder_, name, kLensFiles, address)},
-          {"view", fs::exists(view)
-                       ? json(address + "files/" + name + "/" + kView + "?" + modified(view))
-                       : json()}};
+  json lens = lens_results({folder_, lens_name(), address},
+                           json_in(folder_ / kKept / (lens_name() + ".out")));
+  if (lens.is_object()) lens["version"] = record_["current"];
+  return lens;
 }
 
-json Project::part_json(const std::string& address) const {
-  const std::string within = lens_name() + "/" + kCam;
-  const fs::path file = folder_ / within / cam_file::kReport;
-  const json report = json_in(file);
-  if (!report.is_object() || !report.contains("surfaces")) return nullptr;
-  const bool waves = report.contains("waves");
-  const json& by = waves ? report["waves"] : report;
-  json range = nullptr;
-  if (const json t = report.value("tolerances", json()); t.is_object() && t.contains("mae")) {
-    range = {{"p10", t["mae"]["p10"]},
-             {"p90", t["mae"]["p90"]},
-             {"median", t["mae"]["median"]},
-             {"words", t.value("words", "")}};
-  }
-  json programs = json::array();
-  json files = json::array();
-  json operations = json::array();
-  for (const json& one : report.value("operations", json::array())) {
-    const std::string program = one.value("file", "");
-    const std::string name = one.value("name", "");
-    operations.push_back({{"name", name}, {"minutes", one.value("minutes", 0.0)}});
-    // Several operations may share a program.
-    if (program.empty() || std::find(programs.begin(), programs.end(), program) != programs.end()) {
-      continue;
-    }
-    programs.push_back(program);
-    files.push_back(file_json(folder_ / within / program, (fs::path(within) / program).string(),
-                              "program: " + name, address));
-  }
-  for (json& other : files_of(folder_, within, kPartFiles, address)) {
-    files.push_back(std::move(other));
-  }
-  const fs::path workshop = folder_ / kWorkshop;
-  const bool current =
-      !fs::exists(workshop) || fs::last_write_time(workshop) <= fs::last_write_time(file);
-  const json verdict = report.value("verdict", json::object());
-  std::string missed;
-  for (const json& check : verdict.value("checks", json::array())) {
-    const bool counts = !check.value("pass", true) && !check.value("advice", false);
-    if (counts) missed = with_word(std::move(missed), check.value("words", ""));
-  }
-  const json& last = by["surfaces"].back();
-  return {{"mae", last.value("mae", 0.0)},
-          {"model", waves ? "waves" : "rays"},
-          {"range", range},
-          {"range_words", "No range: cam " + range_fault() + "."},
-          {"leakage", by["leakage"].value("share", 0.0)},
-          {"contrast", by["leakage"].value("contrast", json())},
-          {"minutes", report.value("minutes", 0.0)},
-          {"operations", operations},
-          {"verdict", missed.empty() ? "All limits are kept." : "Limits missed: " + missed + "."},
-          {"pass", verdict.value("pass", false)},
-          {"current", current},
-          {"warnings", report.value("warnings", json::array())},
-          {"pictures", files_of(folder_, within, kPartPictures, address)},
-          {"report", address + "files/" + within + "/" + cam_file::kPage + "?" + modified(file)},
-          {"files", files},
-          {"programs", programs}};
-}
-
-json Project::check_json(const std::string& address) const {
-  const std::string within = lens_name() + "/" + kCheck;
-  const fs::path file = folder_ / within / check_file::kJson;
-  const json check = json_in(file);
-  if (!check.is_object()) return nullptr;
-  json more = json::array();
-  const json causes = check.value("causes", json::array());
-  for (std::size_t k = 1; k < causes.size(); ++k) more.push_back(causes[k].value("words", ""));
-  return {
-      {"verdict", check.value("verdict", "")},
-      {"more", more},
-      {"pictures", files_of(folder_, within, kCheckPictures, address)},
-      {"report", address + "files/" + within + "/" + check_file::kReport + "?" + modified(file)}};
+json Project::part_json(CutFace face, const std::string& address) {
+  const OpticalSetup* const setup = lens_setup();
+  if (setup == nullptr) return nullptr;
+  return cut_results({folder_, lens_name(), address}, face, *setup,
+                     workshop_with(record_["workshop"]));
 }
 
 json Project::job_json(const std::string& address) const {
@@ -759,9 +730,12 @@ json Project::cut_json(const std::string& address) const {
   if (!cut_) return nullptr;
   json cut = cut_->state();
   const Arguments& words = cut_->task().words;  // send PROGRAM --port PORT
-  cut["program"] = fs::path(words[1]).filename().string();
+  const fs::path program = words[1];
+  const bool front = program.parent_path().filename() == lens_file::kFrontCut;
+  const std::string name = program.filename().string();
+  cut["program"] = front ? std::string(lens_file::kFrontCut) + "/" + name : name;
   cut["port"] = words[3];
-  cut["under"] = address + "relief.png?" + lens_name();
+  cut["under"] = address + (front ? kFrontRelief : kRelief) + "?" + lens_name();
   if (cut["status"] == "paused") cut["status"] = "interrupted";
   std::ifstream stream(folder_ / kKept / kEvents, std::ios::binary | std::ios::ate);
   const std::streamoff size = stream ? static_cast<std::streamoff>(stream.tellg()) : 0;
@@ -778,9 +752,9 @@ json Project::cut_json(const std::string& address) const {
        {"percent", "left", "state", "position", "feed", "rpm", "overrides", "line"}) {
     cut[key] = last.value(key, json());
   }
-  cut["tool"] = tool_json(cut["position"], words[1]);
+  cut["tool"] = tool_json(cut["position"], program);
   const bool simulated = words[3].starts_with("sim:");
-  cut["unfinished"] = !simulated && !sending() && is_unfinished(folder_ / words[1]);
+  cut["unfinished"] = !simulated && !sending() && is_unfinished(folder_ / program);
   const std::size_t from = messages.size() - std::min(messages.size(), kMessages);
   cut["messages"] = std::vector<std::string>(messages.begin() + static_cast<std::ptrdiff_t>(from),
                                              messages.end());
@@ -800,31 +774,34 @@ json Project::state(const std::string& address) {
   }
   const int current = record_.value("current", 0);
   const bool idle = !computing();
-  json state{{"name", folder_.filename().string()},
-             {"picture", picture_json(address)},
-             {"settings", record_["settings"]},
-             {"workshop", record_["workshop"]},
-             {"light", light_json()},
-             {"commands", commands_json()},
-             {"plan", plan_json()},
-             {"lens", lens_json(address)},
-             {"versions", list},
-             {"can_undo", idle && !all.empty() && current > all.front()},
-             {"can_redo", idle && !all.empty() && current < all.back()},
-             {"part", part_json(address)},
-             {"photo", fs::is_regular_file(folder_ / kPhoto)},
-             {"check", check_json(address)},
-             {"job", job_json(address)},
-             {"cut", cut_json(address)}};
+  json state{
+      {"name", folder_.filename().string()},
+      {"picture", picture_json("", record_, address)},
+      {"second", has_second() ? picture_json(kSecondPrefix, record_[kSecond], address) : json()},
+      {"settings", record_["settings"]},
+      {"workshop", record_["workshop"]},
+      {"light", light_json()},
+      {"commands", commands_json()},
+      {"plan", plan_json()},
+      {"lens", lens_json(address)},
+      {"front", part_json(CutFace::kFront, address)},
+      {"versions", list},
+      {"can_undo", idle && !all.empty() && current > all.front()},
+      {"can_redo", idle && !all.empty() && current < all.back()},
+      {"part", part_json(CutFace::kBack, address)},
+      {"photo", fs::is_regular_file(folder_ / kPhoto)},
+      {"check", check_results({folder_, lens_name(), address})},
+      {"job", job_json(address)},
+      {"cut", cut_json(address)}};
   constexpr std::size_t kExact = std::size_t{1} << 53U;  // Of JavaScript's numbers.
   state["number"] = std::hash<std::string>()(state.dump()) % kExact;
   return state;
 }
 
-std::string Project::standing() const {
+std::string Project::standing() {
   if (sending()) return "is being cut";
   if (computing()) return job_->task().step + " is running";
-  const json part = part_json("");
+  const json part = part_json(CutFace::kBack, "");
   if (part.is_object()) {
     return "part: " + mae_words(part["mae"]) + ", " + duration_text(part["minutes"]);
   }
@@ -833,7 +810,7 @@ std::string Project::standing() const {
   return fs::is_regular_file(folder_ / kPicture) ? "picture chosen" : "a picture to crop";
 }
 
-json Project::summary(const std::string& address) const {
+json Project::summary(const std::string& address) {
   const bool ready = fs::is_regular_file(folder_ / kPicture);
   const char* const shown = ready ? kPicture : kPreview;
   return {{"name", folder_.filename().string()},

@@ -10,7 +10,10 @@
 #include <string_view>
 #include <vector>
 
+#include "app/studio/results.h"
 #include "app/studio/studio_job.h"
+#include "cam/plan/cam_options.h"
+#include "core/optics/optical_setup.h"
 
 namespace lensforge::app {
 
@@ -36,18 +39,26 @@ class Project {
   /// Everything that the page shows of it. @param address  of its files: "/projects/rose/".
   [[nodiscard]] nlohmann::json state(const std::string& address);
   /// "name", "picture", "words", "running".
-  [[nodiscard]] nlohmann::json summary(const std::string& address) const;
+  [[nodiscard]] nlohmann::json summary(const std::string& address);
 
   /// Takes a PNG as the picture; the original if it is empty.
   void take_picture(std::string_view bytes);
+  /// Takes the bytes of a second picture as it is, and turns --second on. @param title  of its
+  /// file, for messages. @throw InputError if no picture can be read; then nothing is changed.
+  void take_second(const std::string& title, std::string_view bytes);
+  /// Takes a PNG as the second picture; its original if it is empty. @throw InputError if there is
+  /// no second picture.
+  void take_second_picture(std::string_view bytes);
   /// Takes a photograph of the wall for `check`. @throw InputError if no picture can be read.
   void take_photo(std::string_view bytes);
   /// {"settings": {…}, "workshop": {…}}; null removes a value. @throw InputError naming option or
   /// key, value and rule; then nothing is changed.
   void take_settings(const nlohmann::json& changes);
-  /// {"step": "plan" | "design" | "cam" | "view" | "export" | "check", "format": …}
+  /// {"step": "plan" | "design" | "cam-front" | "cam" | "view" | "export" | "check", "format": …};
+  /// "cam-front" is the first of the two setups of a lens with a shaped front, "cam" the second.
   void run(const nlohmann::json& request);
-  /// {"program": "finish.ngc", "port": "sim:grbl@1x", "how": "restart" | "resume"}
+  /// {"program": "finish.ngc" | "cam-front/finish.ngc", "port": "sim:grbl@1x",
+  ///  "how": "restart" | "resume"}
   void send(const nlohmann::json& request);
   void press(const nlohmann::json& request);
   void pause();
@@ -63,8 +74,9 @@ class Project {
   /// A file of the project. @param path  relative. @throw NotFound unless it is a regular file in
   /// the folder, not hidden.
   [[nodiscard]] std::filesystem::path file(std::string_view path) const;
-  /// A picture of the lens's relief; made when it is first asked for. @throw NotFound
-  [[nodiscard]] std::filesystem::path relief() const;
+  /// A picture of a face's relief, as its cutter sees it; made when it is first asked for. @throw
+  /// NotFound
+  [[nodiscard]] std::filesystem::path relief(CutFace face) const;
   [[nodiscard]] std::string live_picture(bool error) const;
 
  private:
@@ -82,31 +94,41 @@ class Project {
   [[nodiscard]] bool computing() const { return job_ && job_->running(); }
   [[nodiscard]] bool sending() const { return cut_ && cut_->running(); }
 
-  /// Why `cam` has no range for the lens; empty if it has.
-  [[nodiscard]] std::string range_fault() const;
-  [[nodiscard]] Arguments words_of(const std::string& step, const std::string& format) const;
+  /// The setup of the current lens; null if there is none.
+  [[nodiscard]] const OpticalSetup* lens_setup();
+  [[nodiscard]] Arguments words_of(const std::string& step, const std::string& format);
+  [[nodiscard]] Arguments cut_words(CutFace face);
+  /// The options of one of the two setups in which a lens of two shaped faces is cut.
+  [[nodiscard]] Arguments setup_words(CutFace face, const OpticalSetup& setup);
+  /// A margin of the blank that leaves the frame between the two setups, mm.
+  [[nodiscard]] double frame_margin(const OpticalSetup& setup);
   [[nodiscard]] Arguments setting_words(bool of_plan) const;
   [[nodiscard]] Arguments send_words(const nlohmann::json& request) const;
 
-  [[nodiscard]] nlohmann::json picture_json(const std::string& address) const;
+  [[nodiscard]] bool has_second() const { return record_.contains("second"); }
+  [[nodiscard]] nlohmann::json picture_json(const std::string& prefix, const nlohmann::json& record,
+                                            const std::string& address) const;
   [[nodiscard]] nlohmann::json light_json();
   [[nodiscard]] nlohmann::json computed_light() const;
-  [[nodiscard]] nlohmann::json commands_json() const;
+  [[nodiscard]] nlohmann::json commands_json();
   [[nodiscard]] nlohmann::json plan_json() const;
   [[nodiscard]] nlohmann::json lens_json(const std::string& address) const;
-  [[nodiscard]] nlohmann::json part_json(const std::string& address) const;
-  [[nodiscard]] nlohmann::json check_json(const std::string& address) const;
+  [[nodiscard]] nlohmann::json part_json(CutFace face, const std::string& address);
   [[nodiscard]] nlohmann::json job_json(const std::string& address) const;
   [[nodiscard]] nlohmann::json tool_json(const nlohmann::json& position,
                                          const std::filesystem::path& program) const;
   [[nodiscard]] nlohmann::json cut_json(const std::string& address) const;
-  [[nodiscard]] std::string standing() const;
+  [[nodiscard]] std::string standing();
 
   std::filesystem::path folder_;
   ComputeTurn* turn_;
   nlohmann::json record_;  ///< studio.json
   nlohmann::json asked_;   ///< What light_ is of: a page asks again and again.
   nlohmann::json light_;
+  std::string setup_read_;             ///< What setup_ was read from.
+  std::optional<OpticalSetup> setup_;  ///< Of the current lens: a page asks again and again.
+  nlohmann::json margin_asked_;        ///< What frame_margin_ is of.
+  double frame_margin_ = 0.0;
   std::unique_ptr<StudioJob> job_;
   std::unique_ptr<StudioJob> cut_;
 };

@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "app/studio/studio.h"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
+#include <condition_variable>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "app/frame/command_line.h"
+#include "app/frame/command_run.h"
+#include "app/frame/option_set.h"
 #include "app/studio/project.h"
+#include "app/studio/results.h"
 #include "app/studio/studio_forms.h"
 #include "app/studio/studio_job.h"
 #include "app/view/loopback_server.h"
@@ -147,19 +153,36 @@ json parsed(std::string_view body) {
   return body.empty() ? json::object() : parse_json(body, "the request");
 }
 
-}  // namespace
+/// Makes the folder of the projects if there is none. @throw InputError naming it.
+fs::path projects_folder(const fs::path& folder) {
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  if (!is_folder(folder)) {
+    throw InputError("FOLDER " + folder.string() + ": is no folder and cannot be made one");
+  }
+  require_writable_folder(folder);
+  return fs::canonical(folder);
+}
 
-/// Projects and requests. Everything is called by the server's thread.
-class Studio::Content {
+/// Serves the page that leads from a picture to a part, to browsers on this machine, and runs the
+/// commands that the page asks for. Projects are folders in one folder; nothing outside of it can
+/// be reached. Only a browser that opened address() is answered, since a page can move a machine.
+/// Requests are answered by the server's thread; at the end all jobs are interrupted, and can be
+/// resumed.
+class Studio {
  public:
-  Content(fs::path folder, int port, Arguments common)
-      : folder_(std::move(folder)),
+  /// @param folder  of the projects; made if it does not exist. @param port  0 takes a free one.
+  /// @param common  words that every computing command gets: --threads, --device.
+  /// @throw InputError naming folder or --port.
+  Studio(const fs::path& folder, int port, Arguments common)
+      : folder_(projects_folder(folder)),
         key_(key_of(folder_)),
         page_(studio_page()),
         turn_(std::move(common)),
         server_({port, "--port", kMaxBody},
                 [this](const LoopbackRequest& request) { return guarded(request); }) {}
 
+  /// "http://127.0.0.1:8420/?key=…": with the key, which is kept in the folder.
   [[nodiscard]] std::string address() const { return server_.address() + "?key=" + key_; }
 
  private:
@@ -207,7 +230,8 @@ class Studio::Content {
     }
     if (path.size() > 3) throw NotFound{"no such page"};
     if (path[2] == "state.json") return json_answer(project.state(address));
-    if (path[2] == "relief.png") return file_answer(project.relief());
+    if (path[2] == kRelief) return file_answer(project.relief(CutFace::kBack));
+    if (path[2] == kFrontRelief) return file_answer(project.relief(CutFace::kFront));
     if (path[2] == "live.png" || path[2] == "live-error.png") {
       std::string picture = project.live_picture(path[2] == "live-error.png");
       if (picture.empty()) throw NotFound{"no picture yet"};
@@ -227,18 +251,27 @@ class Studio::Content {
       projects_.erase(std::string(path[1]));
       return json_answer({{"moved_to", place.string()}});
     }
-    act(project, path[2], request.body);
+    if (path[2] == "second") {
+      project.take_second(title_of(request), request.body);
+    } else {
+      act(project, path[2], request.body);
+    }
     return json_answer(project.state(address_of(path[1])));
   }
 
   LoopbackAnswer created(const LoopbackRequest& request) {
-    const std::string title = unescaped(value_in(request.query, '&', "title"));
-    const fs::path made = Project::create(folder_, title, request.body);
+    const fs::path made = Project::create(folder_, title_of(request), request.body);
     return json_answer({{"name", made.filename().string()}});
+  }
+
+  /// Name of the file that a picture was.
+  static std::string title_of(const LoopbackRequest& request) {
+    return unescaped(value_in(request.query, '&', "title"));
   }
 
   static void act(Project& project, std::string_view action, std::string_view body) {
     if (action == "picture") return project.take_picture(body);
+    if (action == "second-picture") return project.take_second_picture(body);
     if (action == "photo") return project.take_photo(body);
     if (action == "settings") return project.take_settings(parsed(body));
     if (action == "run") return project.run(parsed(body));
@@ -296,18 +329,57 @@ class Studio::Content {
   LoopbackServer server_;  ///< Last, so that it ends first.
 };
 
-Studio::Studio(const fs::path& folder, int port, Arguments common) {
-  std::error_code failed;
-  fs::create_directories(folder, failed);
-  if (!is_folder(folder)) {
-    throw InputError("FOLDER " + folder.string() + ": is no folder and cannot be made one");
-  }
-  require_writable_folder(folder);
-  content_ = std::make_unique<Content>(fs::canonical(folder), port, std::move(common));
+/// Options of `lensforge studio`.
+struct StudioSettings {
+  std::string folder = "studio";
+  int port = 8420;
+};
+
+constexpr int kLargestPort = 65535;
+
+void describe(Description& d, StudioSettings& settings) {
+  d.text("FOLDER", settings.folder, "", "folder of the projects; made if there is none");
+  d.whole("--port", settings.port, Limits::between(0, kLargestPort),
+          "port of the page at 127.0.0.1; 0 takes a free one")
+      .essential = true;
 }
 
-Studio::~Studio() = default;
+/// The common options that were given, for the commands of the studio.
+Arguments common_words(const CommonOptions& common) {
+  Arguments words;
+  if (common.threads > 0) words.insert(words.end(), {"--threads", std::to_string(common.threads)});
+  if (common.device != "auto") words.insert(words.end(), {"--device", common.device});
+  return words;
+}
 
-std::string Studio::address() const { return content_->address(); }
+CommandResult run(CommandFrame& frame, StudioSettings& settings) {
+  frame.begin();
+  {
+    const Studio studio(settings.folder, settings.port, common_words(frame.options().common()));
+    const Console& console = frame.console();
+    if (frame.options().common().quiet) {
+      console.result({{"address", studio.address()}}, studio.address() + "\n");
+    } else {
+      console.note("the studio is at " + studio.address());
+      console.begin();
+    }
+    std::mutex mutex;
+    std::condition_variable_any never;
+    std::unique_lock lock(mutex);
+    never.wait(lock, frame.stop_token(), [] { return false; });
+  }
+  return {.exit_code = kDone, .notes = {"everything is kept in " + settings.folder}};
+}
+
+}  // namespace
+
+int studio_command(const Arguments& arguments) {
+  return run_command<StudioSettings>({"studio",
+                                      "Serves a page on this machine that leads from a picture to "
+                                      "a part: light and sizes, design, "
+                                      "cut, programs.",
+                                      run, "lensforge studio ~/lenses"},
+                                     arguments);
+}
 
 }  // namespace lensforge::app

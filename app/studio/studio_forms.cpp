@@ -31,9 +31,18 @@ using nlohmann::json;
 /// Options of the form, the usual ones first. Those that name files are not among them: a page
 /// reaches nothing but its project.
 constexpr std::array kFormOptions{
-    "--lamp",        "--material", "--width",   "--focal",     "--image-width", "--pixels",
-    "--thickness",   "--outline",  "--quality", "--model",     "--light-model", "--image-offset",
-    "--screen-tilt", "--view",     "--mode",    "--incidence", "--fresnel",     "--background"};
+    "--lamp",         "--material",      "--width",        "--focal",       "--image-width",
+    "--pixels",       "--thickness",     "--faces",        "--outline",     "--quality",
+    "--model",        "--light-model",   "--image-offset", "--screen-tilt", "--view",
+    "--mode",         "--incidence",     "--fresnel",      "--background",  "--second-focal",
+    "--second-width", "--second-offset", "--second-tilt"};
+/// Of these that name a file, is_flag_for_file().
+constexpr std::array kFileFlags{"--made-by", "--second"};
+
+template <std::size_t N>
+bool is_among(const std::array<const char*, N>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
 
 const char* kind_word(FieldKind kind) {
   switch (kind) {
@@ -82,10 +91,12 @@ json light_fields() {
     if (field["name"] == "--outline") field["suggestions"] = {"rectangle", "circle", "rounded:5"};
     fields.push_back(std::move(field));
   }
-  json made = field_json(all.at("--made-by"), "--made-by");
-  made["kind"] = "flag";
-  made["value"] = false;
-  fields.push_back(std::move(made));
+  for (const char* name : kFileFlags) {
+    json field = field_json(all.at(name), name);
+    field["kind"] = "flag";
+    field["value"] = false;
+    fields.push_back(std::move(field));
+  }
   return fields;
 }
 
@@ -190,9 +201,10 @@ json set_key(Workshop& workshop, const std::string& name, const json& value) {
 
 json studio_forms() { return {{"light", light_fields()}, {"workshop", workshop_sections()}}; }
 
+bool is_flag_for_file(const std::string& name) { return is_among(kFileFlags, name); }
+
 bool is_form_option(const std::string& name) {
-  return name == "--made-by" ||
-         std::find(kFormOptions.begin(), kFormOptions.end(), name) != kFormOptions.end();
+  return is_flag_for_file(name) || is_among(kFormOptions, name);
 }
 
 bool is_plan_option(const std::string& name) {
@@ -207,16 +219,23 @@ json changed_settings(json settings, const json& changes) {
     if (!is_form_option(name)) throw InputError("option " + name + ": the page does not set it");
     if (value.is_null()) {
       settings.erase(name);
-      continue;
-    }
-    if (name == "--made-by") {
-      if (!value.is_boolean()) throw InputError("--made-by: must be true or false");
-    } else {
+    } else if (!is_flag_for_file(name)) {
       settings[name] = design_value(name, value);
       refuse_paths(name, settings[name]);
-      continue;
+    } else if (value.is_boolean()) {
+      settings[name] = value;
+    } else {
+      throw InputError(name + ": must be true or false");
     }
-    settings[name] = value;
+  }
+  if (settings.value("--second", false)) return settings;
+  // Without a second picture nothing is left of its screen.
+  for (const char* name : kFormOptions) {
+    if (!std::string_view(name).starts_with("--second-")) continue;
+    if (changes.contains(name) && !changes[name].is_null()) {
+      throw InputError(std::string(name) + ": needs a second picture; choose one");
+    }
+    settings.erase(name);
   }
   return settings;
 }

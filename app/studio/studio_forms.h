@@ -19,6 +19,10 @@ nlohmann::json studio_forms();
 /// True if the page sets the option.
 bool is_form_option(const std::string& name);
 
+/// True for options that name a file, of which the page only says that the project's is meant:
+/// "--made-by" its workshop, "--second" its second picture.
+bool is_flag_for_file(const std::string& name);
+
 /// True if `plan` takes the option.
 bool is_plan_option(const std::string& name);
 

@@ -30,11 +30,13 @@
 #include "core/error.h"
 #include "core/image/image.h"
 #include "core/image/image_io.h"
+#include "core/optics/front.h"
 #include "core/page/drawings.h"
 #include "core/page/html_page.h"
 #include "core/spline/control_net.h"
 #include "core/text/version.h"
 #include "core/text/words.h"
+#include "design/energy/two_face_objective.h"
 #include "design/render.h"
 #include "design/schedule/checkpoint.h"
 #include "view_files.h"
@@ -402,19 +404,32 @@ constexpr std::size_t kMaxPoints = 2000;
 constexpr const char* kSplineStage = "spline";
 
 bool is_spline(const Checkpoint& saved) {
+  if (saved.front.size() > 0) return true;
   return !saved.convergence.empty() && saved.convergence.back().stage == kSplineStage;
 }
 
+/// The setup with the front as the design has shaped it.
+OpticalSetup setup_of(const Checkpoint& saved, OpticalSetup setup) {
+  if (saved.front.size() > 0) setup.front = height_front(saved.front, setup.lens_size);
+  if (saved.shared_front) {
+    setup.front =
+        HeightFront{std::make_shared<const HeightSpline>(*saved.shared_front), setup.lens_size};
+  }
+  return setup;
+}
+
+/// The picture on the first screen.
 Image picture_of(const Checkpoint& saved, const DesignGoalView& goal, const Executor& executor) {
   Image picture;
+  const OpticalSetup setup = setup_of(saved, goal.setup);
   if (is_spline(saved)) {
     const SampledSurface nodes = spline_nodes({saved.mesh.grid, saved.mesh.vertices}, kMeshSamples);
-    evaluate(nodes.mesh, nodes.normals, goal.setup, goal.target, &picture, executor);
+    evaluate(nodes.mesh, nodes.normals, setup, goal.target, &picture, executor);
     return picture;
   }
   const bool facets = goal.model == SurfaceModel::kFacet;
-  evaluate(saved.mesh, goal.setup, facets ? SurfaceModel::kFacet : SurfaceModel::kSmooth,
-           goal.target, &picture, executor);
+  evaluate(saved.mesh, setup, facets ? SurfaceModel::kFacet : SurfaceModel::kSmooth, goal.target,
+           &picture, executor);
   return picture;
 }
 

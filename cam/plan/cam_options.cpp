@@ -137,12 +137,9 @@ std::string frame_fault(const CamOptions& options, const OpticalSetup& setup) {
                  shortest_text(needed), " mm wide around the front for the blank to lie on"});
 }
 
-/// A margin that leaves a frame.
-std::string margin_for_frame(const CamOptions& options, const OpticalSetup& setup) {
-  const double more =
-      frame_needed(options.workshop.process, options.workshop) - frame_width(options, setup);
-  const double margin = options.workshop.stock.margin + more;
-  return joined({"--margin ", decimal_text(std::ceil(10.0 * margin) / 10.0, 1), "mm"});
+/// A margin that leaves a frame, as an option.
+std::string margin_option(const CamOptions& options, const OpticalSetup& setup) {
+  return joined({"--margin ", decimal_text(margin_for_frame(options, setup), 1), "mm"});
 }
 
 /// The greatest slope of a height map at its samples and half-way between them, and its place.
@@ -201,8 +198,7 @@ void validate_face(const CamOptions& options, const OpticalSetup& setup) {
   }
   const std::string fault = frame_fault(options, setup);
   if (!fault.empty()) {
-    throw InputError(fault + " while its back is cut; " + margin_for_frame(options, setup) +
-                     " works");
+    throw InputError(fault + " while its back is cut; " + margin_option(options, setup) + " works");
   }
 }
 
@@ -211,7 +207,7 @@ void validate_frame(const CamOptions& options, const OpticalSetup& setup) {
   const std::string fault = frame_fault(options, setup);
   if (!fault.empty()) {
     throw InputError(joined({"--z-zero table: the lens's front is curved, and ", fault,
-                             "; use stock or lens, or ", margin_for_frame(options, setup)}));
+                             "; use stock or lens, or ", margin_option(options, setup)}));
   }
   if (cuts_outline(options, setup)) {
     throw InputError(
@@ -345,6 +341,12 @@ double frame_width(const CamOptions& options, const OpticalSetup& setup) {
   const double reach = std::max(rough_reach(workshop, box, relief + workshop.stock.allowance),
                                 finishing_ball(options).diameter);
   return workshop.stock.margin - apron - reach;
+}
+
+double margin_for_frame(const CamOptions& options, const OpticalSetup& setup) {
+  const double more =
+      frame_needed(options.workshop.process, options.workshop) - frame_width(options, setup);
+  return std::ceil(10.0 * (options.workshop.stock.margin + more)) / 10.0;
 }
 
 bool lies_on_frame(const CamOptions& options, const OpticalSetup& setup) {

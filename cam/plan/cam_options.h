@@ -142,6 +142,10 @@ inline constexpr double kMinFrame = 3.0;
 /// the tools go beyond the blank. @pre the front is a height map.
 double frame_width(const CamOptions& options, const OpticalSetup& setup);
 
+/// Least stock.margin with which both faces can be cut in two setups, up to the next tenth, mm.
+/// @pre the front is a height map.
+double margin_for_frame(const CamOptions& options, const OpticalSetup& setup);
+
 /// True if the blank lies on such a frame while its back is cut.
 bool lies_on_frame(const CamOptions& options, const OpticalSetup& setup);
 

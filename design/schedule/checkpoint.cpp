@@ -2,10 +2,12 @@
 #include "design/schedule/checkpoint.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <sstream>
 #include <string>
@@ -13,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/image/rasters.h"
 #include "core/io/checkpoint_file.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/schema/json.h"
@@ -21,7 +24,8 @@
 #include "design/setup/design_options.h"
 
 // After the header come, as doubles, the vertices, if the header has scales the reach of their
-// steps, and if it has from_planes the samples of the front.
+// steps, and if it has from_planes the samples of the front; if it has shared_front its heights, as
+// floats.
 
 namespace lensforge {
 namespace {
@@ -31,6 +35,8 @@ using nlohmann::json;
 constexpr std::string_view kMagic = "lensforge checkpoint 4\n";
 /// Key of a design of two faces.
 constexpr const char* kFromPlanes = "from_planes";
+/// Key of a design behind a shared front: its columns and rows.
+constexpr const char* kSharedFront = "shared_front";
 
 template <class Matrix>
 std::span<const double> entries(const Matrix& matrix) {
@@ -140,10 +146,27 @@ void write_checkpoint(const Checkpoint& checkpoint, const std::filesystem::path&
   std::string numbers(bytes_of(entries(checkpoint.mesh.vertices)));
   numbers += bytes_of(entries(steps.reach));
   numbers += bytes_of(entries(checkpoint.front));
+  if (checkpoint.shared_front) {
+    const HeightGrid& front = *checkpoint.shared_front;
+    header[kSharedFront] = {front.columns, front.rows};
+    numbers += bytes_of(std::span<const float>(front.heights));
+  }
   write_checkpoint_file(path, kMagic, {header, numbers});
 }
 
 namespace {
+
+/// A front of the size that the header announces, if it does; its heights are still to be read.
+std::optional<HeightGrid> shared_front_of(const std::filesystem::path& path, const json& header) {
+  if (!header.contains(kSharedFront)) return std::nullopt;
+  HeightGrid grid{header.at(kSharedFront).at(0), header.at(kSharedFront).at(1), {}};
+  const auto possible = [](int n) { return n >= kMinHeightSamples && n <= kMaxHeightSamples; };
+  if (!possible(grid.columns) || !possible(grid.rows)) {
+    refuse_checkpoint(path, "holds a front of an impossible size");
+  }
+  grid.heights.resize(static_cast<std::size_t>(grid.columns) * grid.rows);
+  return grid;
+}
 
 /// Takes the surface and what else the header announces. @pre the header's values were read.
 void read_numbers(const std::filesystem::path& path, const CheckpointContent& parts,
@@ -154,10 +177,13 @@ void read_numbers(const std::filesystem::path& path, const CheckpointContent& pa
   const int least = two_faces ? kSplineDegree + 1 : 2;
   const double vertices = double{1} * shape.columns * shape.rows;
   const GridShape front = two_faces ? front_shape(shape) : GridShape{};
+  std::optional<HeightGrid> shared = shared_front_of(path, parts.header);
+  const std::size_t shared_bytes = shared ? sizeof(float) * shared->heights.size() : 0;
   const double count =
       (scales.is_null() ? 3.0 : 6.0) * vertices + double{1} * front.columns * front.rows;
   if (shape.columns < least || shape.rows < least ||
-      static_cast<double>(parts.numbers.size()) != sizeof(double) * count) {
+      static_cast<double>(parts.numbers.size()) !=
+          sizeof(double) * count + static_cast<double>(shared_bytes)) {
     refuse_checkpoint(path, "holds fewer vertices than its header says");
   }
   const char* next = parts.numbers.data();
@@ -179,7 +205,13 @@ void read_numbers(const std::filesystem::path& path, const CheckpointContent& pa
     checkpoint.front.resize(front.columns, front.rows);
     take(checkpoint.front);
   }
-  if (!checkpoint.mesh.vertices.allFinite() || !checkpoint.front.allFinite()) {
+  if (shared) std::memcpy(shared->heights.data(), next, shared_bytes);
+  checkpoint.shared_front = std::move(shared);
+  const auto finite = [](const HeightGrid& grid) {
+    return std::ranges::all_of(grid.heights, [](float z) { return std::isfinite(z); });
+  };
+  if (!checkpoint.mesh.vertices.allFinite() || !checkpoint.front.allFinite() ||
+      (checkpoint.shared_front && !finite(*checkpoint.shared_front))) {
     refuse_checkpoint(path, "holds a vertex that is not finite");
   }
 }

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/image/image.h"
+#include "core/image/rasters.h"
 #include "core/mesh/surface_mesh.h"
 #include "core/spline/control_net.h"
 #include "design/energy/objective_options.h"
@@ -32,7 +34,9 @@ struct Checkpoint {
   SurfaceMesh mesh;          ///< A grid mesh. Of two faces: control points of the exit face.
   Eigen::MatrixXd front;     ///< Of two faces: LensFaces::front, of front_shape(); else empty.
   bool from_planes = false;  ///< Of two faces: they began as planes, not with transport.
-  StepScales scales;         ///< For the level's further rounds.
+  /// LightOptions::both_faces: the front that was shaped for this design before its exit face.
+  std::optional<HeightGrid> shared_front;
+  StepScales scales;  ///< For the level's further rounds.
   std::vector<ConvergenceRow> convergence;
 };
 

@@ -499,6 +499,8 @@ Checkpoint first_state(const DesignTask& task) {
   if (task.options.resume) return saved_state(task);
   Checkpoint state;
   state.fingerprint = design_fingerprint(task.target, task.options);
+  const LightOptions& light = task.options.light;
+  if (light.both_faces) state.shared_front = light.front_heights->grid();
   state.mesh =
       start_surface(task.setup, task.levels.front().grid, task.options.thickness, task.executor);
   return state;

@@ -605,6 +605,20 @@ TEST(DesignEstimate, TimeOfDesignsForAProcessIsWithinThirtyPercentToo) {
   EXPECT_NEAR(estimate_design(512, 512, options, 1).seconds / 115.0, 1.0, 0.3);
 }
 
+TEST(DesignEstimate, TimeOfTwoFacesIsWithinThirtyPercentToo) {
+  DesignOptions options;
+  options.model = SurfaceModel::kSpline;
+  options.pixels = 64;
+  options.width = 25.0;
+  options.focal_length = 25.0;
+  options.light.both_faces = true;
+  EXPECT_NEAR(estimate_design(64, 64, options, 1).seconds / 24.0, 1.0, 0.3);
+  options.light.both_faces = false;
+  options.focal_length = 40.0;
+  options.second.picture = std::make_shared<const Image>(64, 64, 1.0F);
+  EXPECT_NEAR(estimate_design(64, 64, options, 1).seconds / 64.0, 1.0, 0.3);
+}
+
 TEST(DesignEstimate, ThreadsShareTheTimeAndEffortAddsToIt) {
   DesignOptions options;
   const double one = estimate_design(512, 512, options, 1).seconds;

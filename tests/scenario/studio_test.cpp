@@ -277,6 +277,8 @@ TEST_F(Studio, LeadsFromPictureToASentProgram) {
   EXPECT_EQ(testing::read_bytes(at("same") / "surface.ply"),
             testing::read_bytes(at("studio") / name / "lens-1" / "surface.ply"));
 
+  EXPECT_THAT(error_of(browser.post(place + "/run", json{{"step", "cam-front"}})),
+              HasSubstr("the front of this lens is flat"));
   now = browser.run(name, {{"step", "cam"}});
   ASSERT_EQ(now["job"]["status"], "done") << now["job"];
   EXPECT_LE(now["part"]["range"]["p10"], now["part"]["range"]["p90"]);
@@ -353,6 +355,106 @@ TEST_F(Studio, ChecksAPhotographOfTheWall) {
   EXPECT_FALSE(now["check"]["verdict"].get<std::string>().empty());
   EXPECT_EQ(now["check"]["pictures"].size(), 3U);
   EXPECT_EQ(browser.get(now["check"]["report"])->status, 200);
+}
+
+TEST_F(Studio, CutsBothFacesOfALensInTwoSetups) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("portrait.png");
+  const std::string place = "/projects/" + name;
+  const json both{{"--pixels", 16}, {"--width", 6}, {"--focal", 40}, {"--faces", "two"}};
+  const json quick{{"finish.pitch", 0.4}, {"semi.enabled", false}};
+  browser.post(place + "/settings", json{{"settings", both}, {"workshop", quick}});
+  browser.post(place + "/settings", json{{"settings", {{"--quality", "draft"}}}});
+  json now = browser.run(name, {{"step", "design"}});
+  ASSERT_EQ(now["job"]["status"], "done") << now["job"];
+  EXPECT_TRUE(now["lens"]["two_faces"]);
+  EXPECT_TRUE(now["front"].is_null());
+  for (const json& picture : now["lens"]["pictures"]) {
+    EXPECT_EQ(browser.get(picture["url"])->status, 200) << picture;
+  }
+  // A margin that leaves the frame, unless the workshop states one.
+  const std::string back = now["commands"]["cam"];
+  EXPECT_THAT(back, HasSubstr("--z-zero table --margin 6.6mm"));
+  now = browser.run(name, {{"step", "cam-front"}});
+  ASSERT_EQ(now["job"]["status"], "done") << now["job"];
+  EXPECT_EQ(now["job"]["command"], now["commands"]["cam-front"]);
+  EXPECT_THAT(now["job"]["command"].get<std::string>(), HasSubstr("--face front --margin 6.6mm"));
+  // The back as the page's command cuts it, but without waves and range, which take longer.
+  const fs::path folder = at("studio") / name;
+  const Outcome cut = run({"cam", (folder / "lens-1").string(), "--workshop",
+                           (folder / "workshop.toml").string(), "--post", "grbl", "--z-zero",
+                           "table", "--margin", "6.6mm", "--light-model", "rays", "--no-range"});
+  ASSERT_EQ(cut.exit_code, 0) << cut.err;
+  now = browser.state(name);
+  EXPECT_THAT(now["part"]["faces"].dump(), HasSubstr("Both faces as made: MAE "));
+  for (const char* face : {"front", "part"}) {
+    EXPECT_EQ(browser.get(now[face]["report"])->status, 200) << face;
+    EXPECT_TRUE(now[face]["current"]) << face;
+    for (const json& file : now[face]["files"]) {
+      EXPECT_EQ(browser.get(file["url"])->status, 200) << file;
+    }
+  }
+  EXPECT_EQ(now["front"]["programs"].back(), "cam-front/finish.ngc");
+  EXPECT_EQ(now["part"]["programs"].back(), "finish.ngc");
+  browser.post(place + "/send",
+               json{{"program", "cam-front/rough.ngc"}, {"port", "sim:grbl@1000x"}});
+  now = browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; });
+  EXPECT_EQ(now["cut"]["status"], "done") << now["cut"];
+  EXPECT_EQ(now["cut"]["program"], "cam-front/rough.ngc");
+  EXPECT_THAT(now["cut"]["under"].get<std::string>(), HasSubstr("relief-front.png"));
+  browser.post(place + "/settings", json{{"workshop", {{"stock.margin", 2}}}});
+  now = browser.run(name, {{"step", "cam-front"}});
+  EXPECT_EQ(now["job"]["status"], "failed") << now["job"];
+  EXPECT_THAT(now["job"]["message"].get<std::string>(), HasSubstr("stock.margin 2"));
+}
+
+TEST_F(Studio, DesignsWithASecondPicture) {
+  Browser browser(path("studio"));
+  const std::string name = browser.project("rings.png");
+  const std::string place = "/projects/" + name;
+  const auto second = [&](const std::string& title, const std::string& bytes) {
+    return browser.post(place + "/second?title=" + title, bytes);
+  };
+  const auto light = [&] { return browser.state(name)["light"]; };
+  EXPECT_THAT(error_of(browser.post(place + "/settings", json{{"settings", {{"--second", true}}}})),
+              HasSubstr("there is no second picture yet"));
+  EXPECT_THAT(
+      error_of(browser.post(place + "/settings", json{{"settings", {{"--second-focal", 90}}}})),
+      HasSubstr("--second-focal: needs a second picture"));
+  const auto text = second("notes.txt", "no picture");
+  EXPECT_EQ(text->status, 400);
+  EXPECT_THAT(error_of(text), HasSubstr("notes.txt"));
+  EXPECT_THAT(error_of(text), Not(HasSubstr("second-")));
+  EXPECT_TRUE(browser.state(name)["second"].is_null());
+
+  EXPECT_EQ(second("relief.png", testing::read_bytes(picture("relief.png")))->status, 200);
+  EXPECT_THAT(light().value("error", ""), HasSubstr("needs the place of its screen"));
+  browser.post(place + "/settings", json{{"settings",
+                                          {{"--pixels", 16},
+                                           {"--width", 12},
+                                           {"--thickness", 12},
+                                           {"--focal", 30},
+                                           {"--second-focal", 120},
+                                           {"--quality", "draft"}}}});
+  EXPECT_EQ(light()["setup"]["second"]["centre"][2], 120.0);
+  const json now = browser.run(name, {{"step", "design"}});
+  ASSERT_EQ(now["job"]["status"], "done") << now["job"];
+  EXPECT_THAT(now["job"]["command"].get<std::string>(), HasSubstr("--second second-picture.png"));
+  EXPECT_THAT(now["lens"]["words"].dump(), HasSubstr("second picture: MAE 0.0"));
+  const std::string pictures = now["lens"]["pictures"].dump();
+  EXPECT_THAT(pictures, HasSubstr("render.png"));
+  EXPECT_THAT(pictures, HasSubstr("render_second.png"));
+
+  EXPECT_EQ(second("long.png", testing::read_bytes(picture("calligraphy.png")))->status, 200);
+  EXPECT_THAT(light().value("error", ""), HasSubstr("both pictures need the same proportions"));
+  // Cropped, as the page does it.
+  const std::string crop = testing::read_bytes(at("studio") / name / "picture.png");
+  EXPECT_EQ(browser.post(place + "/second-picture", crop)->status, 200);
+  EXPECT_FALSE(light().contains("error")) << light();
+  // Without it nothing is left of its screen.
+  browser.post(place + "/settings", json{{"settings", {{"--second", nullptr}}}});
+  EXPECT_FALSE(browser.state(name)["settings"].contains("--second-focal"));
+  EXPECT_FALSE(light().contains("error")) << light();
 }
 
 TEST_F(Studio, GoesBackToAnEarlierLensAndItsSettings) {

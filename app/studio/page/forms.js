@@ -10,6 +10,14 @@ const kFirstFields = [
   ["--image-width", "Picture width on the wall", "0 takes the lens’s width."],
   ["--pixels", "Pixels, longer side", "More show finer detail and take longer."],
 ];
+// Those of a second picture, which stand beside it.
+const kSecondFields = [
+  ["--second", "Design with the second picture", "The same light makes it on a wall farther away, or nearer."],
+  ["--second-focal", "Distance of the second wall", "From the lens’s front; at least 1.5 times the nearer wall’s."],
+  ["--second-width", "Width of the second picture", "0 takes the first one’s."],
+  ["--second-offset", "Offset of the second picture", "As X,Y in mm."],
+  ["--second-tilt", "Tilt of the second wall", "As AX,AY in degrees."],
+];
 const kDebounce = 300; // ms
 const kUnits = { "": 1, mm: 1, cm: 10, m: 1000, um: 1e-3, "µm": 1e-3, in: 25.4 };
 
@@ -204,6 +212,10 @@ function makeForms(forms) {
   const left = new Map(forms.light.map((field) => [field.name, field]));
   for (const plain of kFirstFields) {
     if (left.has(plain[0])) find("light").append(makeField(left.get(plain[0]), "settings", plain));
+    left.delete(plain[0]);
+  }
+  for (const plain of kSecondFields) {
+    if (left.has(plain[0])) find("second-fields").append(makeField(left.get(plain[0]), "settings", plain));
     left.delete(plain[0]);
   }
   const madeBy = left.get("--made-by");

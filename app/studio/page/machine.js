@@ -134,9 +134,15 @@ function showCut(cut) {
   machine.status = heard;
 }
 
+// "cam-front/rough.ngc" is of the front's setup, "rough.ngc" of the back's, or of the only one.
+function programText(name, twoSetups) {
+  const [file, folder] = name.split("/").reverse();
+  return twoSetups ? `${folder ? "front" : "back"}: ${file}` : file;
+}
+
 function showMachineStep(state) {
-  const programs = state.part ? state.part.programs : [], select = find("program"), chosen = select.value;
-  rebuild(select, programs, (names) => (names.length ? names : [""]).map((name) => make("option", { value: name, text: name || "none yet: cut the part first" })));
+  const select = find("program"), chosen = select.value, fronts = state.front ? state.front.programs : [], programs = [...fronts, ...(state.part ? state.part.programs : [])];
+  rebuild(select, programs, (names) => (names.length ? names : [""]).map((name) => make("option", { value: name, text: name ? programText(name, fronts.length > 0) : "none yet: cut the part first" })));
   if (programs.includes(chosen)) select.value = chosen;
   find("send-button").disabled = !programs.length || cutRuns();
   showCut(state.cut);

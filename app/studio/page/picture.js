@@ -11,7 +11,11 @@ const kCropFields = [["x", "Left"], ["y", "Top"], ["width", "Width"], ["height",
 // Fingers and mice catch the frame's edges from so far away, in pixels of the page.
 const kCatch = 16;
 
-const editor = { project: null, url: null, image: null, grey: null, crop: null, tone: null, ratio: null, used: null };
+// The pictures of a project that can be edited, by their names in its state: what they are called, and where what is
+// made of them goes.
+const kEdited = { picture: ["First picture", "picture"], second: ["Second picture", "second-picture"] };
+
+const editor = { which: "picture", project: null, url: null, image: null, grey: null, crop: null, tone: null, ratio: null, used: null };
 const kPlainTone = { black: 0, white: 1, gamma: 0, invert: false, behind: false };
 
 // ---- Tone ----
@@ -178,13 +182,39 @@ function startEditor(image) {
   Object.assign(editor, { grey: null, ratio: null, crop: stored ? stored.crop : whole(), tone: stored ? stored.tone : { ...kPlainTone } });
   editor.used = stored ? editText() : null;
   find("aspect").value = "";
+  if (editor.which === "second" && !stored) cropAsFirst();
   setHidden(find("white-row"), !hasAlpha(image));
   sizeEditor();
   showEditor();
 }
 
+// The proportions of the picture that the other one goes with; both must have the same.
+const firstRatio = () => page.state.picture.width / page.state.picture.height;
+
+// The largest part of a second picture in the first one's proportions, in its middle.
+function cropAsFirst() {
+  find("aspect").value = "other";
+  editor.ratio = firstRatio();
+  const all = whole(), fit = fitCrop(all);
+  editor.crop = { ...fit, x: Math.round((all.width - fit.width) / 2), y: Math.round((all.height - fit.height) / 2) };
+}
+
+function edit(which) {
+  editor.which = which;
+  showPictureStep(page.state);
+}
+
+function showWhich(state) {
+  if (!state.second) editor.which = "picture";
+  setHidden(find("which"), !state.second);
+  setHidden(find("aspect-other"), editor.which !== "second");
+  rebuild(find("which"), editor.which, (now) => Object.entries(kEdited).map(([which, [words]]) =>
+    make("button", { type: "button", "data-key": which, "aria-pressed": String(which === now), text: words, onclick: () => edit(which) })));
+  setHidden(find("second-fields"), !state.second);
+}
+
 function loadEditor(state) {
-  const url = state.picture && state.picture.preview;
+  const url = state[editor.which] && state[editor.which].preview;
   if (editor.project === state.name && editor.url === url) return;
   Object.assign(editor, { project: state.name, url, image: null, grey: null });
   if (!url) return;
@@ -194,8 +224,9 @@ function loadEditor(state) {
 }
 
 function showPictureStep(state) {
+  showWhich(state);
   loadEditor(state);
-  const picture = state.picture;
+  const picture = state[editor.which];
   setText(find("picture-size"), picture && picture.ready ? `In use: ${picture.width} × ${picture.height} pixels` : "No picture is in use yet");
   setText(find("picture-changes"), picture && picture.changes.length ? `· ${picture.changes.join("; ")}` : "");
   find("original").classList.toggle("first", Boolean(picture) && !picture.ready);
@@ -208,7 +239,7 @@ async function usePicture() {
   const { width, height } = editor.crop, canvas = make("canvas", { width, height });
   const grey = greyOf(editor.image, editor.crop, width, height, editor.tone.behind);
   canvas.getContext("2d").putImageData(tonedPixels(grey, width, height, editor.tone), 0, 0);
-  if (await act(1, "picture", await pngOf(canvas))) {
+  if (await act(1, kEdited[editor.which][1], await pngOf(canvas))) {
     storeEdit();
     showEditor();
     say("The cropped and toned picture is in use.");
@@ -216,7 +247,7 @@ async function usePicture() {
 }
 
 async function useOriginal() {
-  if (!await act(1, "picture", undefined)) return;
+  if (!await act(1, kEdited[editor.which][1], undefined)) return;
   say("The original is in use as it is.");
   if (!editor.image) return;
   Object.assign(editor, { grey: null, ratio: null, crop: whole(), tone: { ...kPlainTone } });
@@ -224,6 +255,15 @@ async function useOriginal() {
   storeEdit();
   sizeEditor();
   showEditor();
+}
+
+// A second picture is in use as it is, and is cropped where its proportions differ.
+async function useSecond() {
+  const input = find("second-file"), [file] = input.files;
+  input.value = ""; // So that the same file can be chosen again.
+  if (!file || !await act(1, `second?title=${encodeURIComponent(file.name)}`, file)) return;
+  say("The second picture is in use.");
+  edit("second");
 }
 
 // ---- Dragging ----
@@ -299,6 +339,7 @@ function makeEditor() {
   find("aspect").addEventListener("change", chooseAspect);
   find("use").addEventListener("click", usePicture);
   find("original").addEventListener("click", useOriginal);
+  find("second-file").addEventListener("change", useSecond);
   listenToCrop();
   new ResizeObserver(sizeEditor).observe(find("crop").parentElement);
 }
@@ -314,6 +355,6 @@ function cropTyped(name, value) {
 function chooseAspect() {
   const chosen = find("aspect").value, all = editor.image && whole();
   if (!all) return;
-  editor.ratio = chosen === "own" ? all.width / all.height : Number(chosen) || null;
+  editor.ratio = chosen === "own" ? all.width / all.height : chosen === "other" ? firstRatio() : Number(chosen) || null;
   setCrop(editor.crop);
 }

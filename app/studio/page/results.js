@@ -17,6 +17,8 @@ function reportRow(url, words) {
 }
 const fact = (name, value) => make("div", {}, make("dt", { text: name }), make("dd", { text: value }));
 
+const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1).replace(/\.$/, "")}.`;
+
 // ---- Step 2: blur and proposals ----
 const blurs = { shown: new Map() };
 
@@ -67,6 +69,7 @@ function proposalCard(p, settings) {
 
 function showPlan(state) {
   const proposals = state.plan ? state.plan.proposals : [];
+  setHidden(find("plan-note"), state.settings["--faces"] !== "two" && !state.settings["--second"]);
   rebuild(find("proposals"), [proposals, proposals.map((p) => isTaken(p, state.settings))], ([list]) => list.map((p) => proposalCard(p, state.settings)));
 }
 
@@ -124,18 +127,47 @@ function partFigures(part) {
   ].filter(Boolean);
 }
 
-function showPart(state) {
-  const part = state.part;
-  setHidden(find("part"), !part);
-  setHidden(find("part-empty"), Boolean(part));
+// A lens with a shaped front is cut in two setups, of the front first; any other in one.
+const kSetups = [["front", "The front: setup 1 of 2"], ["part", "The back: setup 2 of 2"]];
+const parts = new Map();
+const kCutHints = ["computes the programs and predicts the part; nothing moves yet",
+  "the front first, into the flat blank; then the back, with the blank turned over onto the frame that stays around the front. Nothing moves yet."];
+
+function makeParts() {
+  for (const [key, title] of kSetups) {
+    const block = {
+      title: make("h4", { class: "setup", text: title }), old: make("p", { class: "notice", text: "This part was made from another version or workshop. Cut again to bring it up to date." }),
+      verdict: make("p", { class: "sentence", "data-verdict": true }), figures: make("div", { class: "figures", "data-figures": true }), faces: make("ul", { class: "list" }),
+      warnings: make("div", { class: "warned" }), pictures: make("div", { class: "strip" }), files: make("ul", { class: "files", "data-part-files": true }),
+    };
+    const root = make("div", { "data-part": key, hidden: true }, ...Object.values(block));
+    parts.set(key, { root, ...block });
+    find("parts").append(root);
+  }
+}
+
+function showSetup({ root, title, old, verdict, figures, faces, warnings, pictures, files }, part, twoFaces) {
+  setHidden(root, !part);
   if (!part) return;
-  setHidden(find("part-old"), part.current !== false);
-  setText(find("verdict"), part.verdict || "");
-  rebuild(find("figures"), [part.mae, part.range, part.leakage, part.contrast, part.minutes, part.operations], () => partFigures(part));
-  rebuild(find("warnings"), part.warnings, (list) => (list.length
+  setHidden(title, !twoFaces);
+  setHidden(old, part.current !== false);
+  setText(verdict, part.verdict || "");
+  rebuild(figures, [part.mae, part.range, part.leakage, part.contrast, part.minutes, part.operations], () => partFigures(part));
+  rebuild(faces, part.faces, (list) => list.map((text) => make("li", { text: sentence(text) })));
+  setHidden(faces, !part.faces.length);
+  rebuild(warnings, part.warnings, (list) => (list.length
     ? [make("h4", { text: list.length === 1 ? "A warning" : `${list.length} warnings` }), make("ul", {}, ...list.map((text) => make("li", { text })))] : []));
-  rebuild(find("part-pictures"), part.pictures, (list) => list.map(figure));
-  rebuild(find("part-files"), [part.report, part.files], ([report, list]) => [...(report ? [reportRow(report, "all figures of the part")] : []), ...list.map(fileRow)]);
+  rebuild(pictures, part.pictures, (list) => list.map(figure));
+  rebuild(files, [part.report, part.files], ([report, list]) => [reportRow(report, "all figures of the part"), ...list.map(fileRow)]);
+}
+
+function showPart(state) {
+  const twoFaces = Boolean(state.lens && state.lens.two_faces);
+  for (const [key, block] of parts) showSetup(block, state[key], twoFaces);
+  setHidden(find("part-empty"), Boolean(state.part || state.front));
+  setHidden(document.querySelector('[data-run="cam-front"]'), !twoFaces);
+  setText(find("cut-button"), twoFaces ? "Cut the back" : "Cut");
+  setText(find("cut-words"), kCutHints[Number(twoFaces)]);
 }
 
 // ---- A photograph of the wall ----

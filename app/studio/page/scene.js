@@ -50,6 +50,12 @@ function layoutOfLamp(setup, middle, wall, drawn) {
   return { at: drawn(offset), size: [size, size], mm: norm(offset), parallel: false };
 }
 
+// The second picture: how far it is, and where it is drawn, shortened as the first one is, and at most twice as far.
+function secondWall(second, middle, first, wall) {
+  const offset = plus(second.centre, middle), at = times(offset, norm(wall) * Math.min(1 / norm(first), 2 / norm(offset)));
+  return { shape: rectangle(second.size, at, second.right, second.up), at, mm: norm(offset), size: second.size };
+}
+
 // `light` has the optical setup as lens.json has it. Light goes along rectangles: from the lamp to the face where it
 // enters, from the face where it leaves to the picture.
 function layout(light) {
@@ -64,10 +70,12 @@ function layout(light) {
     other: rectangle(size, [0, 0, thick]), picture: rectangle(screen.size, wall, screen.right, screen.up) };
   // Light does not change sides on its way to a picture that is seen from behind.
   shapes.landing = screen.right[0] < 0 ? shapes.picture : [1, 0, 3, 2].map((i) => shapes.picture[i]);
-  const ends = [...shapes.enter, ...shapes.picture, ...shapes.lamp], border = 0.12 * Math.max(screen.size[0], size[0]);
+  const far = light.setup.second && secondWall(light.setup.second, middle, offset, wall);
+  if (far) shapes.second = far.shape;
+  const ends = [...shapes.enter, ...shapes.picture, ...shapes.lamp, ...(far ? far.shape : [])], border = 0.12 * Math.max(screen.size[0], size[0]);
   const sides = extent(ends, 0), along = extent(ends, 2), floor = extent(ends, 1)[0] - 0.12 * Math.max(screen.size[1], size[1]);
   shapes.wall = rectangle([0, 1].map((i) => 1.24 * Math.max(size[i], screen.size[i])), wall, screen.right, screen.up);
-  return { shapes, lamp, wall, wallMm: norm(offset), mirror, floor, along, sides: [sides[0] - border, sides[1] + border],
+  return { shapes, lamp, wall, wallMm: norm(offset), far, mirror, floor, along, sides: [sides[0] - border, sides[1] + border],
     normal: cross(screen.right, screen.up) };
 }
 
@@ -129,7 +137,8 @@ function measures(room, at, view) {
   const bar = (end) => tick(start) + tick(end) + line(start, end, at, "measure");
   const words = (end, text) => label(plus(times(plus(start, end), 0.5), [room.mirror ? 0 : Math.sign(x) * mark, 0, 0]), at, text, "", 18);
   const lampWords = room.lamp.parallel ? room.lamp.words : lineWords(room.lamp.mm, norm(room.lamp.at));
-  return (room.lamp.parallel ? "" : bar(foot(room.lamp.at))) + bar(foot(room.wall)) + words(foot(room.lamp.at), lampWords) +
+  const far = room.far ? bar(foot(room.far.at)) + words(foot(room.far.at), lineWords(room.far.mm, norm(room.far.at))) : "";
+  return far + (room.lamp.parallel ? "" : bar(foot(room.lamp.at))) + bar(foot(room.wall)) + words(foot(room.lamp.at), lampWords) +
     words(foot(room.wall), lineWords(room.wallMm, norm(room.wall)));
 }
 
@@ -144,7 +153,8 @@ function names(light, room, at) {
   const { lamp, shapes } = room, { lens_size: size, screen } = light.setup;
   const lampName = lamp.parallel ? "" : label(plus(lamp.at, [0, lamp.size[1] / 2, 0]), at, lamp.size[0] ? `lamp ${millimetres(lamp.size[0])}` : "lamp", "named", -16);
   return lampName + nameAbove(shapes.enter, at, `${room.mirror ? "mirror" : "lens"} ${sizeText(size)}`) +
-    nameAbove(shapes.picture, at, `picture ${sizeText(screen.size)}`);
+    nameAbove(shapes.picture, at, `picture ${sizeText(screen.size)}`) +
+    (room.far ? nameAbove(shapes.second, at, `second picture ${sizeText(room.far.size)}`) : "");
 }
 
 // ---- Drawing ----
@@ -156,7 +166,7 @@ const kSceneParts = `<defs><radialGradient id="glow"><stop offset="0" stop-color
 // Fits everything that is measured into the frame, whatever the angle.
 function fitted(room, view, width, height) {
   const { shapes, along, sides, floor } = room, middle = (along[0] + along[1]) / 2;
-  const points = [...shapes.wall, ...shapes.enter, ...(room.lamp.parallel ? [] : shapes.lamp), ...along.flatMap((z) => sides.map((x) => [x, floor, z]))];
+  const points = [...shapes.wall, ...shapes.enter, ...(shapes.second || []), ...(room.lamp.parallel ? [] : shapes.lamp), ...along.flatMap((z) => sides.map((x) => [x, floor, z]))];
   const distance = 4 * Math.max(along[1] - along[0], sides[1] - sides[0]);
   const flat = points.map((p) => project(p, view, middle, distance));
   const bounds = [0, 1].map((axis) => extent(flat, axis));
@@ -188,7 +198,9 @@ function drawScene() {
   const wall = face(room.shapes.wall, at, seen ? "wall" : "wall behind"), part = partShape(room, at, view), lamp = lampShape(room, at);
   const things = dot(room.lamp.at, view.forward) < 0 ? part + shapes.before + lamp : shapes.before + lamp + part;
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  below.innerHTML = floorLines(room, at) + (far ? wall : things + shapes.behind + wall);
+  // The second wall takes the first one's place; a frame shows where.
+  const second = room.far ? face(room.shapes.second, at, "wall behind second") + beam(room.shapes.landing, room.shapes.second, at, "beam") : "";
+  below.innerHTML = floorLines(room, at) + (far ? second + wall : things + shapes.behind + wall + second);
   above.innerHTML = (far ? shapes.behind + things : "") + measures(room, at, view) + names(light, room, at);
   image.setAttribute("transform", picturePlace(room.shapes.picture, at));
   // From behind, the picture shines through the wall.
@@ -198,11 +210,12 @@ function drawScene() {
 
 function sceneWords(light) {
   if (light.error) return "";
-  const { source, screen, lens_size: size } = light.setup, { lamp, mirror, wallMm } = layout(light);
+  const { source, screen, lens_size: size } = light.setup, { lamp, mirror, wallMm, far } = layout(light);
   const width = source.size_mm ? ` of ${millimetres(source.size_mm)}` : "", angle = source.angle_mrad ? ` of ${number(source.angle_mrad, 3)} mrad` : "";
+  const second = far ? ` A second one of ${sizeText(far.size)} is on a wall ${millimetres(far.mm)} away.` : "";
   const from = lamp.parallel ? `Parallel light${angle}` : `A lamp${width}, ${millimetres(lamp.mm)} before the ${mirror ? "mirror" : "lens"},`;
   const part = mirror ? `a mirror of ${sizeText(size)}` : `a lens of ${sizeText(size)}, at least ${millimetres(light.thickness_mm)} thick`;
-  return `${from} shines on ${part}. Its picture of ${sizeText(screen.size)} is on a wall ${millimetres(wallMm)} away.`;
+  return `${from} shines on ${part}. Its picture of ${sizeText(screen.size)} is on a wall ${millimetres(wallMm)} away.${second}`;
 }
 
 // The last scene that could be drawn stays while settings are refused.

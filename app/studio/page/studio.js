@@ -3,8 +3,8 @@
 
 const kQuick = 500; // ms between questions while something runs
 const kSlow = 2000;
-const kStepOfJob = { plan: 2, design: 3, view: 3, cam: 4, export: 4, check: 4 };
-const kJobWords = { plan: "Plan", design: "Design", view: "View", cam: "Cut", export: "Export", check: "Check" };
+const kStepOfJob = { plan: 2, design: 3, view: 3, "cam-front": 4, cam: 4, export: 4, check: 4 };
+const kJobWords = { plan: "Plan", design: "Design", view: "View", "cam-front": "Cut of the front", cam: "Cut", export: "Export", check: "Check" };
 const kActive = new Set(["waiting", "running", "stopping"]);
 const kStepNames = ["Picture", "Light and size", "Lens", "Part", "Machine"];
 
@@ -60,7 +60,7 @@ function showJob(state) {
     if (mine) showStrip(strip, job);
   }
   const busy = Boolean(job && kActive.has(job.status)), ready = Boolean(state.picture && state.picture.ready), bad = !state.light || Boolean(state.light.error);
-  const can = { plan: ready, design: ready && !bad, cam: Boolean(state.lens), export: Boolean(state.lens), check: Boolean(state.lens) && state.photo };
+  const can = { plan: ready, design: ready && !bad, "cam-front": Boolean(state.lens), cam: Boolean(state.lens), export: Boolean(state.lens), check: Boolean(state.lens) && state.photo };
   for (const button of document.querySelectorAll("[data-run]")) button.disabled = busy || !can[button.dataset.run];
   find("view").disabled = busy;
   find("photo").disabled = busy || !state.lens;
@@ -89,9 +89,9 @@ function openFinishedView(state, busy) {
 
 // ---- Steps ----
 function stepNotes(state) {
-  const { picture, light, lens, part, cut } = state;
+  const { picture, light, lens, front, part, cut } = state, minutes = [front, part].filter(Boolean).map((one) => one.minutes);
   return [picture && picture.ready ? `${picture.width} × ${picture.height}` : "", light && !light.error ? `${number(light.lens_mm[0])} mm at ${number(light.focal_mm)} mm` : "",
-    lens ? `MAE ${number(lens.mae, 2)}` : "", part ? minutesText(part.minutes) : "", cut ? (cut.status === "running" ? `${Math.floor(cut.percent)} %` : cut.status) : ""];
+    lens ? `MAE ${number(lens.mae, 2)}` : "", minutes.length ? minutesText(minutes.reduce((sum, one) => sum + one)) : "", cut ? (cut.status === "running" ? `${Math.floor(cut.percent)} %` : cut.status) : ""];
 }
 
 function markCurrent(link, current) {
@@ -296,6 +296,7 @@ async function begin() {
 
 makeEditor();
 makeStart();
+makeParts();
 makeMachine();
 makeSteps();
 listenToScene();

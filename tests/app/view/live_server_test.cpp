@@ -10,7 +10,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,6 +20,10 @@
 #include "app/view/loopback_server.h"
 #include "app/view/page_client.h"
 #include "core/error.h"
+#include "core/temp_folder.h"
+#include "design/design.h"
+#include "design/schedule/checkpoint.h"
+#include "design/test_setups.h"
 
 namespace lensforge {
 namespace {
@@ -277,6 +283,39 @@ TEST(LiveServer, RandomBytesKeepItNeitherFromAnsweringNorFromEnding) {
 TEST(LiveServer, RefusesAPortThatIsInUse) {
   const Served live;
   EXPECT_THROW(LiveServer(live.port(), "rings", "", [] {}), InputError);
+}
+
+TEST(LiveState, HasThePictureBehindTheFrontThatTheDesignHasShaped) {
+  const testing::TempFolder folder;
+  const Image picture = testing::spot_picture(16, 16);
+  DesignOptions options;
+  options.pixels = 16;
+  options.width = 12.0;
+  options.focal_length = 15.0;
+  options.iterations = 10;
+  options.light.both_faces = true;
+  options.checkpoint = folder / "checkpoint";
+  std::stop_source stop;
+  int seen = 0;
+  const RunControl control(stop.get_token(), [&](const Progress& p) {
+    if (p.detail.starts_with("MAE") && ++seen == 12) stop.request_stop();
+  });
+  ASSERT_EQ(design_lens(picture, options, Executor::serial(), control).status,
+            DesignResult::Status::kInterrupted);
+  const auto mae_behind = [&](const OpticalSetup& setup) {
+    const LiveState state = state_of_design(
+        options.checkpoint, {working_picture(picture, options, {}), setup, options.model}, 1,
+        Executor::serial());
+    return nlohmann::json::parse(state.json)["mae"].get<double>();
+  };
+  // The page knows the options, which have no front yet.
+  const OpticalSetup setup = optical_setup(options, {16, 16});
+  ASSERT_FALSE(setup.front);
+  EXPECT_LT(mae_behind(setup), 0.03);
+  Checkpoint flat = read_checkpoint(options.checkpoint);
+  flat.shared_front.reset();
+  write_checkpoint(flat, options.checkpoint);
+  EXPECT_GT(mae_behind(setup), 0.05);
 }
 
 }  // namespace

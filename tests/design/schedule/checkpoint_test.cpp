@@ -123,6 +123,25 @@ TEST(Checkpoint, BothFacesComeBackToTheBit) {
               HasSubstr("vertices"));
 }
 
+TEST(Checkpoint, ASharedFrontComesBackToTheBit) {
+  const TempFolder folder;
+  Checkpoint before = sample();
+  before.shared_front = {4, 5, std::vector<float>(20)};
+  for (std::size_t i = 0; i < 20; ++i) {
+    before.shared_front->heights[i] = -0.3F / static_cast<float>(i + 1);
+  }
+  write_checkpoint(before, folder / "checkpoint");
+  const Checkpoint after = read_checkpoint(folder / "checkpoint");
+  EXPECT_EQ(after.shared_front, before.shared_front);
+  EXPECT_EQ(after.mesh.vertices, before.mesh.vertices);
+  const std::string bytes = testing::read_bytes(folder / "checkpoint");
+  const std::string size = "\"shared_front\":[4,5]";
+  EXPECT_THAT(refusal_of(folder, forged(bytes, size, "\"shared_front\":[4,6]")),
+              HasSubstr("vertices"));
+  EXPECT_THAT(refusal_of(folder, forged(bytes, size, "\"shared_front\":[1,20]")),
+              HasSubstr("a front of an impossible size"));
+}
+
 TEST(Checkpoint, AFileIsThatOfEarlierVersions) {
   const TempFolder folder;
   Checkpoint checkpoint = sample();
