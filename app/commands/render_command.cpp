@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "app/commands/settings.h"
 #include "app/frame/command_line.h"
 #include "app/frame/command_run.h"
 #include "app/frame/common_output.h"
@@ -72,9 +73,7 @@ void describe(Description& d, RenderArguments& arguments) {
          "than √(λ f); takes seconds");
   d.number("--wavelength", arguments.wavelength_nm, Limits::between(kMinWavelength, kMaxWavelength),
            "nm", "of the wave; white light is as 550");
-  d.length("--at", arguments.at, Limits::zero_or(kMinThickness, kMaxFocalLength),
-           "the light at this z instead, without a target: between a lens's two screens its size "
-           "and place lie between theirs");
+  describe_at(d, arguments.at);
   describe(d, arguments.render);
 }
 
@@ -176,18 +175,11 @@ OpticalSetup at_distance(OpticalSetup setup, double z, double height) {
 /// Takes --at. @throw InputError if it does not fit the other options or the lens.
 void put_distance(const OptionSet& options, double z, Scene& scene) {
   if (z == 0.0) return;
-  for (const char* other : {"--focal", "--target"}) {
-    if (options.given(other)) {
-      throw InputError(std::string("--at: cannot be given with ") + other + "; leave one out");
-    }
+  if (options.given("--target")) {
+    throw InputError("--at: cannot be given with --target; leave one out");
   }
   const double height = scene.surface.vertices.row(2).mean();
-  scene.render.setup = at_distance(scene.render.setup, z, height);
-  if (!(scene.render.setup.image_size.minCoeff() > 0.0)) {
-    throw InputError("--at " + number_text(z) +
-                     ": there the picture has no size left between those of the two screens; a z "
-                     "between them works");
-  }
+  scene.render.setup = setup_at(options, z, height, scene.render.setup);
   scene.target.reset();
   scene.second.reset();
 }
@@ -450,6 +442,24 @@ CommandResult run(CommandFrame& frame, RenderArguments& arguments) {
 }
 
 }  // namespace
+
+void describe_at(Description& d, double& z) {
+  d.length("--at", z, Limits::zero_or(kMinThickness, kMaxFocalLength),
+           "the light at this z instead, without a target: between a lens's two screens its size "
+           "and place lie between theirs");
+}
+
+OpticalSetup setup_at(const OptionSet& options, double z, double height,
+                      const OpticalSetup& setup) {
+  if (options.given("--focal")) {
+    throw InputError("--at: cannot be given with --focal; leave one out");
+  }
+  OpticalSetup there = at_distance(setup, z, height);
+  if (there.image_size.minCoeff() > 0.0) return there;
+  throw InputError("--at " + number_text(z) +
+                   ": there the picture has no size left between those of the two screens; a z "
+                   "between them works");
+}
 
 int render_command(const Arguments& arguments) {
   return run_command<RenderArguments>(

@@ -6,10 +6,12 @@
 #include "app/frame/command_run.h"
 #include "app/frame/option_set.h"
 #include "cam/coupon/coupon.h"
+#include "core/optics/optical_setup.h"
 #include "design/reflect.h"
 #include "export/export.h"
 
-/// Options of the short commands: coupon, export and reflect.
+/// Options of the short commands: coupon, export and reflect, and those that `render` has
+/// everywhere.
 namespace lensforge::app {
 
 /// Options of `lensforge coupon`.
@@ -57,5 +59,13 @@ struct ReflectSettings {
 
 /// Describes every option of the command.
 void describe(Description& d, ReflectSettings& settings);
+
+/// Describes --at of `render`, the z of another screen, mm; 0: the lens's own.
+void describe_at(Description& d, double& z);
+
+/// The setup with its screen at z = `z`: between a lens's two screens size and place of the picture
+/// lie between theirs. @param height  of the surface, mean. @throw InputError naming --at if it
+/// does not fit the other options or the lens.
+OpticalSetup setup_at(const OptionSet& options, double z, double height, const OpticalSetup& setup);
 
 }  // namespace lensforge::app

@@ -250,9 +250,17 @@ py::tuple three_lamps(const py::object& picture, app::OptionValues values,
 
 // --- render
 
+/// What is rendered.
+struct RenderWish {
+  RenderOptions render;
+  double at = 0.0;  ///< z of another screen, mm; 0: that of `render`.
+};
+
 /// Render options for a lens in one colour.
-Description options_of(RenderOptions& render) {
-  return description_of(render).except({"--wavelengths", "--abbe"});
+Description options_of(RenderWish& wish) {
+  Description options = description_of(wish.render).except({"--wavelengths", "--abbe"});
+  app::describe_at(options, wish.at);
+  return options;
 }
 
 /// The picture that a lens projects, in its target's light.
@@ -272,10 +280,15 @@ Image picture_of(const Lens& lens, const RenderOptions& render, const Executor& 
 
 py::array render(const LensObject& source, const app::OptionValues& values) {
   const Lens& lens = source.lens();
-  RenderOptions chosen{.model = lens.model, .setup = lens.setup};
+  RenderWish wish{{.model = lens.model, .setup = lens.setup}};
+  RenderOptions& chosen = wish.render;
   app::OptionSet options("render", "");
-  options.add(options_of(chosen));
+  options.add(options_of(wish));
   options.take(values);
+  if (wish.at > 0.0) {
+    const double height = lens.surface.vertices.row(2).mean();
+    chosen.setup = app::setup_at(options, wish.at, height, chosen.setup);
+  }
   if (chosen.model == SurfaceModel::kSpline && !lens.spline) {
     throw InputError("model spline: must be facet or smooth: the lens is no spline");
   }
@@ -411,7 +424,7 @@ void add_commands(py::module_& module) {
                                        const py::object& progress) {
     return three_lamps(picture, of_lamps.values(options), progress);
   });
-  RenderOptions usual;
+  RenderWish usual;
   const Keywords of_render("render", options_of(usual), {}, Keywords::Defaults::kOfALens);
   module.attr("render_options") = of_render.text();
   module.def("render", [of_render](const LensObject& lens, const py::dict& options) {

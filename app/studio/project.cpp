@@ -559,8 +559,8 @@ fs::path Project::file(std::string_view path) const {
   return whole;
 }
 
-std::string Project::live_picture(bool error) const {
-  return job_ ? job_->live_picture(error) : std::string();
+std::string Project::live_picture(std::string LiveState::*picture) const {
+  return job_ ? job_->live_picture(picture) : std::string();
 }
 
 fs::path Project::relief(CutFace face) const {
@@ -690,6 +690,9 @@ json Project::job_json(const std::string& address) const {
     const std::string number = std::to_string(job["live"].value("number", 0));
     job["live"]["picture"] = address + "live.png?" + number;
     job["live"]["error"] = address + "live-error.png?" + number;
+    if (job["live"].value("two_screens", false)) {
+      job["live"]["second"] = address + "live-second.png?" + number;
+    }
   }
   return job;
 }

@@ -77,7 +77,8 @@ class Project {
   /// A picture of a face's relief, as its cutter sees it; made when it is first asked for. @throw
   /// NotFound
   [[nodiscard]] std::filesystem::path relief(CutFace face) const;
-  [[nodiscard]] std::string live_picture(bool error) const;
+  /// A picture of the running design, bytes of a PNG; empty if there is none yet.
+  [[nodiscard]] std::string live_picture(std::string LiveState::*picture) const;
 
  private:
   void save() const;

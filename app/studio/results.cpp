@@ -124,7 +124,7 @@ json face_words_of(const json& report) {
   const auto add = [&](const std::string& text) {
     if (!text.empty()) words.push_back(text);
   };
-  const json surfaces = report["surfaces"];
+  const json& surfaces = report["surfaces"];
   const auto both = std::find_if(surfaces.begin(), surfaces.end(), [](const json& one) {
     return one.value("name", "") == surface_name::kBoth;
   });
@@ -226,11 +226,12 @@ json cut_results(const ShownLens& lens, CutFace face, const OpticalSetup& setup,
   cut.face = face;
   json programs = json::array();
   json files = json::array();
+  // A front's are named by their folder, too: `send` has to know which face is meant.
+  const std::string before =
+      face == CutFace::kFront ? std::string(lens_file::kFrontCut) + "/" : std::string();
   for (const auto& [program, name] : programs_of(report)) {
-    // A front's are named by their folder, too: `send` has to know which face is meant.
-    const bool front = face == CutFace::kFront;
-    programs.push_back(front ? std::string(lens_file::kFrontCut) + "/" + program : program);
-    files.push_back(file_json(lens.project / within / program, within + "/" + program,
+    programs.push_back(joined({before, program}));
+    files.push_back(file_json(lens.project / within / program, joined({within, "/", program}),
                               "program: " + name, lens.address));
   }
   for (json& other : files_of(lens, within, kPartFiles)) files.push_back(std::move(other));

@@ -149,6 +149,15 @@ std::string studio_page() {
   return html_page(content);
 }
 
+/// Pictures of a running design by their names in a project.
+const std::map<std::string_view, std::string LiveState::*>& live_pictures() {
+  static const std::map<std::string_view, std::string LiveState::*> all{
+      {"live.png", &LiveState::picture},
+      {"live-error.png", &LiveState::error},
+      {"live-second.png", &LiveState::second}};
+  return all;
+}
+
 json parsed(std::string_view body) {
   return body.empty() ? json::object() : parse_json(body, "the request");
 }
@@ -232,8 +241,8 @@ class Studio {
     if (path[2] == "state.json") return json_answer(project.state(address));
     if (path[2] == kRelief) return file_answer(project.relief(CutFace::kBack));
     if (path[2] == kFrontRelief) return file_answer(project.relief(CutFace::kFront));
-    if (path[2] == "live.png" || path[2] == "live-error.png") {
-      std::string picture = project.live_picture(path[2] == "live-error.png");
+    if (const auto live = live_pictures().find(path[2]); live != live_pictures().end()) {
+      std::string picture = project.live_picture(live->second);
       if (picture.empty()) throw NotFound{"no picture yet"};
       return answer_with("image/png", std::move(picture));
     }

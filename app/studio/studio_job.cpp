@@ -60,7 +60,11 @@ DesignGoalView goal_of(const Arguments& words) {
   settle(options, settings, loaded.image, {});
   Image target = working_picture(loaded.image, settings.design, {});
   const OpticalSetup setup = optical_setup(settings.design, {target.columns(), target.rows()});
-  return {std::move(target), setup, settings.design.model};
+  DesignGoalView goal{std::move(target), setup, settings.design.model};
+  if (const auto& second = settings.design.second.picture) {
+    goal.second = working_picture(*second, settings.design, {});
+  }
+  return goal;
 }
 
 /// The words with paths that are valid in this process, which works in another folder.
@@ -219,13 +223,16 @@ json StudioJob::state() const {
              {"words", words},
              {"message", message_},
              {"live", nullptr}};
-  if (live_.number > 0) state["live"] = json::parse(live_.json);
+  if (live_.number > 0) {
+    state["live"] = json::parse(live_.json);
+    state["live"]["two_screens"] = !live_.second.empty();
+  }
   return state;
 }
 
-std::string StudioJob::live_picture(bool error) const {
+std::string StudioJob::live_picture(std::string LiveState::*picture) const {
   const std::lock_guard lock(mutex_);
-  return error ? live_.error : live_.picture;
+  return live_.*picture;
 }
 
 json earlier_job(const fs::path& folder, const std::string& files) {

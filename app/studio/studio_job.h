@@ -63,8 +63,8 @@ class StudioJob {
   void press(char key) const;
   /// "step", "status", "command", "share", "words", "message", "live".
   [[nodiscard]] nlohmann::json state() const;
-  /// Bytes of a PNG of the design so far; empty before the first.
-  [[nodiscard]] std::string live_picture(bool error) const;
+  /// Bytes of a PNG of the design so far; empty before the first. @param picture  which one.
+  [[nodiscard]] std::string live_picture(std::string LiveState::*picture) const;
 
  private:
   void run(const std::stop_token& stop);

@@ -418,17 +418,17 @@ OpticalSetup setup_of(const Checkpoint& saved, OpticalSetup setup) {
   return setup;
 }
 
-/// The picture on the first screen.
-Image picture_of(const Checkpoint& saved, const DesignGoalView& goal, const Executor& executor) {
+/// A picture as the surface makes it so far. @param setup  with its front and the picture's screen.
+Image picture_of(const Checkpoint& saved, const OpticalSetup& setup, const DesignGoalView& goal,
+                 const Image& target, const Executor& executor) {
   Image picture;
-  const OpticalSetup setup = setup_of(saved, goal.setup);
   if (is_spline(saved)) {
     const SampledSurface nodes = spline_nodes({saved.mesh.grid, saved.mesh.vertices}, kMeshSamples);
-    evaluate(nodes.mesh, nodes.normals, setup, goal.target, &picture, executor);
+    evaluate(nodes.mesh, nodes.normals, setup, target, &picture, executor);
     return picture;
   }
   const bool facets = goal.model == SurfaceModel::kFacet;
-  evaluate(saved.mesh, setup, facets ? SurfaceModel::kFacet : SurfaceModel::kSmooth, goal.target,
+  evaluate(saved.mesh, setup, facets ? SurfaceModel::kFacet : SurfaceModel::kSmooth, target,
            &picture, executor);
   return picture;
 }
@@ -460,7 +460,8 @@ std::string bytes_of(const ColorImage& image) {
 LiveState state_of_design(const std::filesystem::path& checkpoint, const DesignGoalView& goal,
                           std::int64_t number, const Executor& executor) {
   const Checkpoint saved = read_checkpoint(checkpoint);
-  const Image picture = picture_of(saved, goal, executor);
+  const OpticalSetup setup = setup_of(saved, goal.setup);
+  const Image picture = picture_of(saved, setup, goal, goal.target, executor);
   const std::size_t rounds = rounds_of(saved);
   const nlohmann::json state{{"number", number},
                              {"rounds", rounds},
@@ -468,8 +469,13 @@ LiveState state_of_design(const std::filesystem::path& checkpoint, const DesignG
                              {"plot", plot_of(saved)},
                              {"words", "round " + std::to_string(rounds + 1) + " at work, " +
                                            duration_text(saved.seconds / 60.0) + " so far"}};
-  return {number, state.dump(), bytes_of(grey_picture(picture)),
-          bytes_of(error_image(picture, goal.target))};
+  LiveState live{number, state.dump(), bytes_of(grey_picture(picture)),
+                 bytes_of(error_image(picture, goal.target)), ""};
+  if (goal.second) {
+    const OpticalSetup far = on_second_screen(setup);
+    live.second = bytes_of(grey_picture(picture_of(saved, far, goal, *goal.second, executor)));
+  }
+  return live;
 }
 
 }  // namespace lensforge

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -76,6 +77,7 @@ struct LiveState {
   std::string json;         ///< For the page's script.
   std::string picture;      ///< Bytes of a PNG each.
   std::string error;
+  std::string second = {};  ///< The picture on the second screen; empty if there is none.
 };
 
 /// Serves the page of a running design to browsers on this machine: loopback only, and only to its
@@ -106,6 +108,7 @@ struct DesignGoalView {
   Image target;  ///< Working picture, linear light.
   OpticalSetup setup;
   SurfaceModel model = SurfaceModel::kSmooth;
+  std::optional<Image> second = {};  ///< Working picture of setup.second.
 };
 
 /// Computes the state of a running design from its latest checkpoint: the picture at full size, its

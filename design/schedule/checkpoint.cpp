@@ -164,7 +164,7 @@ std::optional<HeightGrid> shared_front_of(const std::filesystem::path& path, con
   if (!possible(grid.columns) || !possible(grid.rows)) {
     refuse_checkpoint(path, "holds a front of an impossible size");
   }
-  grid.heights.resize(static_cast<std::size_t>(grid.columns) * grid.rows);
+  grid.heights.resize(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows));
   return grid;
 }
 

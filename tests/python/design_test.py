@@ -45,6 +45,12 @@ class Design(unittest.TestCase):
         self.assertLess(np.abs(lens.second_target - lens.second_projected).mean(), 0.05)
         self.assertGreater(np.abs(lens.second_target - lens.target).mean(), 0.05)
         self.assertFalse(lens.second_projected.flags.writeable)
+        # Its light on the second screen, and between both.
+        there = lensforge.render(lens, at=90)
+        np.testing.assert_allclose(there / there.mean(), lens.second_projected / lens.second_projected.mean(), atol=1e-5)
+        self.assertGreater(np.abs(lensforge.render(lens, at=50) - lens.projected).mean(), 1e-3)
+        with self.assertRaisesRegex(lensforge.InputError, "^at: cannot be given with focal"):
+            lensforge.render(lens, at=50, focal=60)
         again = pickle.loads(pickle.dumps(lens))
         self.assertEqual(again, lens)
         np.testing.assert_array_equal(again.second_projected, lens.second_projected)

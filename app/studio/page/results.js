@@ -80,6 +80,8 @@ function showLive(job, state) {
   if (!live) return false;
   setPicture(find("live-picture"), live.picture);
   setPicture(find("live-error"), live.error);
+  setPicture(find("live-second"), live.second);
+  setHidden(find("live-far"), !live.second);
   setPicture(find("live-target"), state.picture && state.picture.url);
   setText(find("live-words"), `${live.rounds ? `after round ${live.rounds}` : "before the first round"}, MAE ${live.mae.toFixed(4)}`);
   if (built.get(find("live-plot")) !== live.plot) find("live-plot").innerHTML = live.plot;

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
@@ -20,6 +21,8 @@
 #include "app/view/loopback_server.h"
 #include "app/view/page_client.h"
 #include "core/error.h"
+#include "core/image/image.h"
+#include "core/image/image_io.h"
 #include "core/temp_folder.h"
 #include "design/design.h"
 #include "design/schedule/checkpoint.h"
@@ -285,37 +288,70 @@ TEST(LiveServer, RefusesAPortThatIsInUse) {
   EXPECT_THROW(LiveServer(live.port(), "rings", "", [] {}), InputError);
 }
 
-TEST(LiveState, HasThePictureBehindTheFrontThatTheDesignHasShaped) {
-  const testing::TempFolder folder;
-  const Image picture = testing::spot_picture(16, 16);
+/// A design that is stopped when it has reported so many iterations on the picture.
+void stop_design(const Image& picture, const DesignOptions& options, int iterations) {
+  std::stop_source stop;
+  int seen = 0;
+  const RunControl control(stop.get_token(), [&](const Progress& p) {
+    if (p.detail.starts_with("MAE") && ++seen == iterations) stop.request_stop();
+  });
+  ASSERT_EQ(design_lens(picture, options, Executor::serial(), control).status,
+            DesignResult::Status::kInterrupted);
+}
+
+DesignOptions small_design(const testing::TempFolder& folder) {
   DesignOptions options;
   options.pixels = 16;
   options.width = 12.0;
   options.focal_length = 15.0;
   options.iterations = 10;
-  options.light.both_faces = true;
   options.checkpoint = folder / "checkpoint";
-  std::stop_source stop;
-  int seen = 0;
-  const RunControl control(stop.get_token(), [&](const Progress& p) {
-    if (p.detail.starts_with("MAE") && ++seen == 12) stop.request_stop();
-  });
-  ASSERT_EQ(design_lens(picture, options, Executor::serial(), control).status,
-            DesignResult::Status::kInterrupted);
-  const auto mae_behind = [&](const OpticalSetup& setup) {
-    const LiveState state = state_of_design(
-        options.checkpoint, {working_picture(picture, options, {}), setup, options.model}, 1,
-        Executor::serial());
-    return nlohmann::json::parse(state.json)["mae"].get<double>();
-  };
+  return options;
+}
+
+double mae_of(const LiveState& state) {
+  return nlohmann::json::parse(state.json)["mae"].get<double>();
+}
+
+TEST(LiveState, HasThePictureBehindTheFrontThatTheDesignHasShaped) {
+  const testing::TempFolder folder;
+  const Image picture = testing::spot_picture(16, 16);
+  DesignOptions options = small_design(folder);
+  options.light.both_faces = true;
+  stop_design(picture, options, 12);
   // The page knows the options, which have no front yet.
-  const OpticalSetup setup = optical_setup(options, {16, 16});
-  ASSERT_FALSE(setup.front);
-  EXPECT_LT(mae_behind(setup), 0.03);
+  const DesignGoalView goal{working_picture(picture, options, {}), optical_setup(options, {16, 16}),
+                            options.model};
+  ASSERT_FALSE(goal.setup.front);
+  const auto mae = [&] {
+    return mae_of(state_of_design(options.checkpoint, goal, 1, Executor::serial()));
+  };
+  EXPECT_LT(mae(), 0.03);
   Checkpoint flat = read_checkpoint(options.checkpoint);
   flat.shared_front.reset();
   write_checkpoint(flat, options.checkpoint);
-  EXPECT_GT(mae_behind(setup), 0.05);
+  EXPECT_GT(mae(), 0.05);
+}
+
+TEST(LiveState, OfTwoPicturesHasBothScreens) {
+  const testing::TempFolder folder;
+  const Image picture = testing::spot_picture(16, 16);
+  Image other(16, 16, 0.5F);
+  for (int i = 0; i < 16; ++i) other.at(i, 4) = 0.7F;
+  DesignOptions options = small_design(folder);
+  options.thickness = 12.0;
+  options.focal_length = 30.0;
+  options.second.picture = std::make_shared<const Image>(other);
+  options.second.focal_length = 120.0;
+  stop_design(picture, options, 60);
+  const DesignGoalView goal{working_picture(picture, options, {}), optical_setup(options, {16, 16}),
+                            options.model, working_picture(other, options, {})};
+  const LiveState state = state_of_design(options.checkpoint, goal, 1, Executor::serial());
+  EXPECT_LT(mae_of(state), 0.05);
+  testing::write_bytes(folder / "second.png", state.second);
+  const Image shown = read_image(folder / "second.png").image;
+  EXPECT_LT(compare(shown, *goal.second).mae, 0.05);
+  EXPECT_GT(compare(shown, goal.target).mae, 0.1);
 }
 
 }  // namespace
