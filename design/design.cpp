@@ -420,8 +420,8 @@ constexpr double kSmoothShare = 0.4;  ///< Of a smooth mesh.
 /// more evaluations than iterations.
 constexpr double kWavesPerIteration = 2.6;
 /// Time of a design behind a front that it shapes, over that behind a flat one: every ray has to be
-/// found through the front (64² portrait on 25 mm, wall at 25 and 40 mm: 24 and 22 s for 5.2).
-constexpr double kSharedFrontCost = 4.5;
+/// found through the front (portrait on 25 mm: 24 s in place of 5.2 with 64², 78 of 24 with 128²).
+constexpr double kSharedFrontCost = 4.0;
 /// Of a design for two pictures, per pixel and DesignOptions::iterations (relief and rings of 32²
 /// and 64² on 25 mm: 15 and 64 s; nearly twice where it begins with plane faces).
 constexpr double kTwoPicturesSeconds = 1.5e-4;

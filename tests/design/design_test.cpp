@@ -608,15 +608,19 @@ TEST(DesignEstimate, TimeOfDesignsForAProcessIsWithinThirtyPercentToo) {
 TEST(DesignEstimate, TimeOfTwoFacesIsWithinThirtyPercentToo) {
   DesignOptions options;
   options.model = SurfaceModel::kSpline;
-  options.pixels = 64;
   options.width = 25.0;
-  options.focal_length = 25.0;
-  options.light.both_faces = true;
-  EXPECT_NEAR(estimate_design(64, 64, options, 1).seconds / 24.0, 1.0, 0.3);
-  options.light.both_faces = false;
   options.focal_length = 40.0;
-  options.second.picture = std::make_shared<const Image>(64, 64, 1.0F);
-  EXPECT_NEAR(estimate_design(64, 64, options, 1).seconds / 64.0, 1.0, 0.3);
+  const auto seconds = [&](int pixels) {
+    options.pixels = pixels;
+    return estimate_design(512, 512, options, 1).seconds;
+  };
+  options.light.both_faces = true;
+  EXPECT_NEAR(seconds(64) / 22.0, 1.0, 0.3);
+  EXPECT_NEAR(seconds(128) / 78.0, 1.0, 0.3);
+  options.light.both_faces = false;
+  options.second.picture = std::make_shared<const Image>(512, 512, 1.0F);
+  EXPECT_NEAR(seconds(32) / 15.0, 1.0, 0.3);
+  EXPECT_NEAR(seconds(64) / 64.0, 1.0, 0.3);
 }
 
 TEST(DesignEstimate, ThreadsShareTheTimeAndEffortAddsToIt) {
