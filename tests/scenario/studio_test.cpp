@@ -357,14 +357,17 @@ TEST_F(Studio, ChecksAPhotographOfTheWall) {
   EXPECT_EQ(browser.get(now["check"]["report"])->status, 200);
 }
 
-TEST_F(Studio, CutsBothFacesOfALensInTwoSetups) {
+TEST_F(Studio, CutsAShapedFrontFirstAndOffersTheBack) {
   Browser browser(path("studio"));
   const std::string name = browser.project("portrait.png");
   const std::string place = "/projects/" + name;
-  const json both{{"--pixels", 16}, {"--width", 6}, {"--focal", 40}, {"--faces", "two"}};
+  const json both{{"--pixels", 16},
+                  {"--width", 6},
+                  {"--focal", 40},
+                  {"--faces", "two"},
+                  {"--quality", "draft"}};
   const json quick{{"finish.pitch", 0.4}, {"semi.enabled", false}};
   browser.post(place + "/settings", json{{"settings", both}, {"workshop", quick}});
-  browser.post(place + "/settings", json{{"settings", {{"--quality", "draft"}}}});
   json now = browser.run(name, {{"step", "design"}});
   ASSERT_EQ(now["job"]["status"], "done") << now["job"];
   EXPECT_TRUE(now["lens"]["two_faces"]);
@@ -379,23 +382,14 @@ TEST_F(Studio, CutsBothFacesOfALensInTwoSetups) {
   ASSERT_EQ(now["job"]["status"], "done") << now["job"];
   EXPECT_EQ(now["job"]["command"], now["commands"]["cam-front"]);
   EXPECT_THAT(now["job"]["command"].get<std::string>(), HasSubstr("--face front --margin 6.6mm"));
-  // The back as the page's command cuts it, but without waves and range, which take longer.
-  const fs::path folder = at("studio") / name;
-  const Outcome cut = run({"cam", (folder / "lens-1").string(), "--workshop",
-                           (folder / "workshop.toml").string(), "--post", "grbl", "--z-zero",
-                           "table", "--margin", "6.6mm", "--light-model", "rays", "--no-range"});
-  ASSERT_EQ(cut.exit_code, 0) << cut.err;
-  now = browser.state(name);
-  EXPECT_THAT(now["part"]["faces"].dump(), HasSubstr("Both faces as made: MAE "));
-  for (const char* face : {"front", "part"}) {
-    EXPECT_EQ(browser.get(now[face]["report"])->status, 200) << face;
-    EXPECT_TRUE(now[face]["current"]) << face;
-    for (const json& file : now[face]["files"]) {
-      EXPECT_EQ(browser.get(file["url"])->status, 200) << file;
-    }
+  EXPECT_THAT(now["front"]["faces"].dump(), HasSubstr("cut the back, too"));
+  EXPECT_EQ(browser.get(now["front"]["report"])->status, 200);
+  EXPECT_TRUE(now["front"]["current"]);
+  for (const json& file : now["front"]["files"]) {
+    EXPECT_EQ(browser.get(file["url"])->status, 200) << file;
   }
   EXPECT_EQ(now["front"]["programs"].back(), "cam-front/finish.ngc");
-  EXPECT_EQ(now["part"]["programs"].back(), "finish.ngc");
+  EXPECT_TRUE(now["part"].is_null());
   browser.post(place + "/send",
                json{{"program", "cam-front/rough.ngc"}, {"port", "sim:grbl@1000x"}});
   now = browser.wait(name, [](const json& s) { return s["cut"]["status"] != "running"; });
