@@ -482,12 +482,19 @@ namespace {
 struct DistantStart {
   Deviation cause;
   double value;
+  double least = 0.0;  ///< CauseFit::systematic from which on it is tried.
 };
+/// Above what photographs have whose causes were found, and below what a fault leaves.
+constexpr double kUnexplained = 0.001;
 /// Scallops that a weaker polish leaves show suddenly, so that nothing of them is in the
 /// derivatives around the forecast; where they show, those of a ball that is a sixth off have
-/// little in common with what the derivatives tell.
-constexpr std::array<DistantStart, 3> kDistantStarts{
-    {{Deviation::kPolish, -0.35}, {Deviation::kBall, -0.15}, {Deviation::kBall, 0.15}}};
+/// little in common with what the derivatives tell. So has what diffraction makes of a wall that
+/// is 2 % nearer.
+constexpr std::array<DistantStart, 5> kDistantStarts{{{Deviation::kPolish, -0.35},
+                                                      {Deviation::kBall, -0.15},
+                                                      {Deviation::kBall, 0.15},
+                                                      {Deviation::kDistance, -0.02, kUnexplained},
+                                                      {Deviation::kDistance, 0.02, kUnexplained}}};
 
 /// A fit and what speaks for and against its causes.
 struct TestedFit {
@@ -547,8 +554,10 @@ TestedFit search(const TestedFit& from, int most) {
   for (const std::vector<Deviation>& causes : from.test.best(most)) {
     if (causes != from.fit.active()) take(with_causes(from.fit, causes));
   }
+  const double systematic = from.fit.pixels().shared_by_neighbours(from.fit.left());
   for (const DistantStart& start : kDistantStarts) {
-    if (most == 1 && from.test.may_be_named(start.cause)) take(with_cause_from(from.fit, start));
+    if (most > 1 || systematic < start.least || !from.test.may_be_named(start.cause)) continue;
+    take(with_cause_from(from.fit, start));
   }
   if (best.fit.active() != from.fit.active()) {
     for (const Deviation d : std::vector<Deviation>(best.fit.active())) {
