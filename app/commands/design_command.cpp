@@ -164,10 +164,22 @@ LoadedImage read_target(const DesignSettings& settings, const RunControl& contro
 
 namespace {
 
+/// Options of schedules that two pictures do not have.
+constexpr std::array kOnePicture{"--levels",     "--rounds",
+                                 "--mesh-ratio", "--transport-rounds",
+                                 "--spread",     "--no-rendering-guided",
+                                 "--smoothness", "--update-iterations"};
+
 /// Reads the picture of --second. @throw InputError; Interrupted.
-void read_second(DesignSettings& settings, const RunControl& control) {
+void read_second(const OptionSet& options, DesignSettings& settings, const RunControl& control) {
   SecondOptions& second = settings.design.second;
   if (second.file.empty()) return;
+  for (const char* name : kOnePicture) {
+    if (!options.given(name)) continue;
+    throw InputError(std::string(name) +
+                     ": has no effect on two pictures, whose rounds follow from --quality; leave "
+                     "it out with --second");
+  }
   if (!settings.live.empty()) {
     throw InputError("--live " + settings.live + ": shows one picture; leave it out with --second");
   }
@@ -216,7 +228,7 @@ void settle(OptionSet& options, DesignSettings& settings, const Image& picture,
   note_changes(settings, "--source-picture " + light.source_picture,
                read_lamp(light, settings.background, control));
   if (!light.front_file.empty()) light.front_heights = front_from(light.front_file, control);
-  read_second(settings, control);
+  read_second(options, settings, control);
   if (!settings.outline.empty()) {
     OutlineChoice choice = outline_from(settings.outline, settings.background, control);
     note_changes(settings, "--outline " + settings.outline, choice.changes);

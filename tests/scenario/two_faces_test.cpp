@@ -209,6 +209,7 @@ TEST_F(TwoFaces, WhatTheyCannotHaveIsRefusedInOneLine) {
       {{"--fresnel"}, {"--fresnel", "--second"}},
       {{"--outline", "circle"}, {"--outline", "--second"}},
       {{"--live", "0"}, {"--live", "--second"}},
+      {{"--rounds", "2"}, {"--rounds", "leave it out with --second"}},
       {{"--second-tilt", "85,0"}, {"--second-tilt 85", "0,0 works"}}};
   for (const auto& [options, words] : faults) {
     expect_refusal(run(two_pictures(path("lens"), options)), 2, words);
