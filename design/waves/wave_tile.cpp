@@ -99,46 +99,64 @@ class WaveTile {
   /// True if no light leaves.
   [[nodiscard]] bool is_dark() const { return whole_ <= 0.0; }
 
-  /// Its field on the planes at the screen.
-  [[nodiscard]] std::vector<PlaneField> on_planes() const {
-    PlaneField field(plan_.field);
+  /// Calls `take(number, field)` for its field on each of the planes at the screen.
+  template <class Take>
+  void for_each_plane(const Take& take) const {
+    PlaneField laid(plan_.field);
     if (has_edge()) {
       for_each_laid([&](const auto& corners, const auto& indices) {
-        if (from_edge(indices) < 2 * edge_ring()) field.cover(corners);
+        if (from_edge(indices) < 2 * edge_ring()) laid.cover(corners);
       });
     }
     for_each_laid(
-        [&](const auto& corners, const auto& indices) { field.add(corners, where(indices)); });
-    field.lay_rest();
-    std::vector<PlaneField> planes;
-    for (int k = 0; k + 1 < plan_.planes; ++k) planes.push_back(field.to_plane(plan_.way_to(k)));
-    planes.push_back(plan_.planes == 1 ? std::move(field)
-                                       : field.to_plane(plan_.way_to(plan_.planes - 1)));
-    for (PlaneField& plane : planes) plane.propagate();
-    return planes;
+        [&](const auto& corners, const auto& indices) { laid.add(corners, where(indices)); });
+    laid.lay_rest();
+    if (is_on_one_plane()) {
+      laid.propagate();
+      return take(0, laid);
+    }
+    for (int k = 0; k < plan_.planes; ++k) {
+      PlaneField plane = laid.to_plane(plan_.way_to(k));
+      plane.propagate();
+      take(static_cast<std::size_t>(k), plane);
+    }
   }
 
   /// Each node's light is spread over its cell, along the mean ray.
-  /// @param planes  on_planes() @return of each plane.
-  [[nodiscard]] std::vector<PixelLight> light(const std::vector<PlaneField>& planes) const {
+  /// @param kept  gets a field on one plane; may be null. @return of each plane.
+  [[nodiscard]] std::vector<PixelLight> light(std::vector<PlaneField>* kept) const {
     std::vector<PixelLight> all;
-    for (const PlaneField& plane : planes) all.push_back(plane.spread(on_picture(all.size())));
+    for_each_plane([&](std::size_t k, PlaneField& plane) {
+      all.push_back(plane.spread(on_picture(k)));
+      if (kept != nullptr && is_on_one_plane()) kept->push_back(std::move(plane));
+    });
     all.front().whole = whole_;
     if (as_rays_ > 0.0) add_rays(all.front());
     return all;
   }
+  [[nodiscard]] bool is_on_one_plane() const { return plan_.planes == 1; }
 
   /// Calls `take(column, row, derivative)` for all nodes: tile_heights_bar().
-  /// @param planes  on_planes()
+  /// @param kept  the field of light(), if it was kept.
   template <class Take>
-  void heights_bar(std::vector<PlaneField> planes, std::span<const double> by_pixel,
+  void heights_bar(std::optional<PlaneField> kept, std::span<const double> by_pixel,
                    const Take& take) const {
-    for (std::size_t k = 0; k < planes.size(); ++k) {
-      planes[k].pull(on_picture(k), by_pixel);
-      planes[k].return_back();
-      if (k > 0) planes.front().add(planes[k]);
+    std::optional<PlaneField> sum;
+    const auto pull = [&](std::size_t k, PlaneField& plane) {
+      plane.pull(on_picture(k), by_pixel);
+      plane.return_back();
+      if (sum) {
+        sum->add(plane);
+      } else {
+        sum = std::move(plane);
+      }
+    };
+    if (kept) {
+      pull(0, *kept);
+    } else {
+      for_each_plane(pull);
     }
-    PlaneField& field = planes.front();
+    PlaneField& field = *sum;
     std::vector<double> by_path(nodes_.size(), 0.0);
     for_each_laid([&](const auto& corners, const auto& indices) {
       field.gather(corners, where(indices), indices, by_path);
@@ -741,10 +759,10 @@ std::vector<PixelLight> tile_light(const WaveScene& scene, const WaveColor& colo
                                    TileMemory* memory) {
   std::vector<PixelLight> parts;
   for_each_part(scene, color, nodes, tile, memory, [&](const WaveTile& part) {
-    std::vector<PlaneField> planes = part.on_planes();
-    for (PixelLight& light : part.light(planes)) parts.push_back(std::move(light));
-    if (memory == nullptr || !memory->keeps_fields) return;
-    for (PlaneField& plane : planes) memory->fields.push_back(std::move(plane));
+    const bool keeps = memory != nullptr && memory->keeps_fields;
+    for (PixelLight& light : part.light(keeps ? &memory->fields : nullptr)) {
+      parts.push_back(std::move(light));
+    }
   });
   return parts;
 }
@@ -759,16 +777,11 @@ std::vector<double> tile_heights_bar(const WaveScene& scene, const WaveColor& co
          static_cast<std::size_t>(column - tile.x.begin)] += bar;
   };
   std::vector<PlaneField> kept = std::exchange(memory.fields, {});
-  auto next = std::make_move_iterator(kept.begin());
+  std::size_t next = 0;
   for_each_part(scene, color, nodes, tile, &memory, [&](const WaveTile& part) {
-    std::vector<PlaneField> planes;
-    if (kept.empty()) {
-      planes = part.on_planes();
-    } else {
-      planes.assign(next, next + part.plan().planes);
-      next += part.plan().planes;
-    }
-    part.heights_bar(std::move(planes), by_pixel, add);
+    std::optional<PlaneField> field;
+    if (part.is_on_one_plane() && next < kept.size()) field = std::move(kept[next++]);
+    part.heights_bar(std::move(field), by_pixel, add);
   });
   return bars;
 }

@@ -375,7 +375,8 @@ struct TileMemory {
   /// True if the rays went so much farther apart than before that nothing was made.
   bool strayed = false;
   bool keeps_fields = false;
-  std::vector<PlaneField> fields;  ///< On the screen, for tile_heights_bar(), which uses them up.
+  /// On the screen, of parts with one plane; for tile_heights_bar(), which uses them up.
+  std::vector<PlaneField> fields;
 };
 
 /// Light that a tile of a surface sends to the pixels, of its quarters if its field would be too
