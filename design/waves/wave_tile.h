@@ -364,7 +364,10 @@ struct TilePlan {
   double apart = 0.0;  ///< Of neighbours, mm.
 
   /// Of a plane from that of `field`, mm.
-  [[nodiscard]] double way_to(int plane) const { return (plane - planes / 2) * apart; }
+  [[nodiscard]] double way_to(int plane) const {
+    const int middle = planes / 2;
+    return (plane - middle) * apart;
+  }
 };
 
 /// What is kept of a tile from one look at its surface to the next.
