@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -32,8 +33,12 @@ namespace {
 /// Beyond each side of the picture: light of a wall that is 15 % off, and some of the haze's.
 constexpr double kMargin = 0.12;
 
-/// WaveOptions::stray: a tilt of the wall is found by less than what a picture shows of it.
+/// WaveOptions::stray of a wall or a part that is tilted: a tilt is found by less than what a
+/// picture shows of it.
 constexpr double kStray = 0.002;
+
+constexpr std::array<Deviation, 4> kTilts{Deviation::kTiltX, Deviation::kTiltY,
+                                          Deviation::kPartTiltX, Deviation::kPartTiltY};
 
 /// Greatest polish that is looked for, in multiples of the workshop's.
 constexpr double kMostPolish = 2.5;
@@ -338,11 +343,10 @@ void WallModel::choose_light() {
   waves_.emplace();
   waves_->wavelength = wavelength;
   waves_->scatter = order_angles(wavelength, passes_);
-  waves_->stray = kStray;
   const OpticalSetup point = lit_from(wide_, Eigen::Vector2d::Zero());
   const std::shared_ptr<const Part> made = part(Deviations::Zero());
   const std::vector<double> rays = light_of(*made, point);
-  const std::vector<double> waves = waves_of(*made, point);
+  const std::vector<double> waves = waves_of(*made, point, *waves_);
   const double pixel = wide_.image_size.x() / wide_.pixels.x();
   const double width = diffraction_width(wide_, height_, wavelength) / pixel;
   constexpr int kBlurs = 12;
@@ -358,18 +362,22 @@ void WallModel::choose_light() {
   }
 }
 
-std::vector<double> WallModel::waves_of(const Part& part, const OpticalSetup& optics) const {
+std::vector<double> WallModel::waves_of(const Part& part, const OpticalSetup& optics,
+                                        const WaveOptions& waves) const {
   const SurfaceField* const surface = &part.held;
-  return wave_flux(optics, grid_, {&surface, 1}, *waves_, executor_, silent_).front();
+  return wave_flux(optics, grid_, {&surface, 1}, waves, executor_, silent_).front();
 }
 
-const std::vector<double>& WallModel::diffraction(Deviations at) const {
+const std::vector<double>& WallModel::diffraction(Deviations at, bool for_tilts) const {
   at[index_of(Deviation::kLampSize)] = 0.0;
   at[index_of(Deviation::kHaze)] = 0.0;
-  return diffractions_.of(at, [&] {
+  for (const Deviation d : kTilts) for_tilts = for_tilts || at[index_of(d)] != 0.0;
+  return diffractions_.of({at, for_tilts}, [&] {
     const OpticalSetup point = lit_from(optics_of(at), Eigen::Vector2d::Zero());
     const std::shared_ptr<const Part> made = part(at);
-    return difference(waves_of(*made, point),
+    WaveOptions waves = *waves_;
+    if (for_tilts) waves.stray = kStray;
+    return difference(waves_of(*made, point, waves),
                       softened(light_of(*made, point), wide_.pixels, diffraction_blur_));
   });
 }
@@ -380,14 +388,15 @@ const std::vector<double>& WallModel::diffraction_change(Deviation deviation) co
     const Eigen::Index i = index_of(deviation);
     Deviations moved = Deviations::Zero();
     moved[i] = deviation_steps(lens_.setup)[i];
-    const std::vector<double> planned = diffraction(Deviations::Zero());
-    change = difference(diffraction(moved), planned);
+    const bool tilts = std::find(kTilts.begin(), kTilts.end(), deviation) != kTilts.end();
+    const std::vector<double> planned = diffraction(Deviations::Zero(), tilts);
+    change = difference(diffraction(moved, tilts), planned);
   }
   return change;
 }
 
 std::vector<double> WallModel::diffraction(const Deviations& at, const Deviations& near) const {
-  std::vector<double> rest = diffraction(near);
+  std::vector<double> rest = diffraction(near, false);
   const Deviations by = (at - near).cwiseQuotient(deviation_steps(lens_.setup));
   for (std::size_t k = 0; k < kDeviations; ++k) {
     const auto d = static_cast<Deviation>(k);

@@ -149,9 +149,11 @@ class WallModel {
   /// Shares of the light of a part.
   [[nodiscard]] std::vector<double> light_of(const Part& part, const OpticalSetup& optics) const;
   /// The same by waves.
-  [[nodiscard]] std::vector<double> waves_of(const Part& part, const OpticalSetup& optics) const;
+  [[nodiscard]] std::vector<double> waves_of(const Part& part, const OpticalSetup& optics,
+                                             const WaveOptions& waves) const;
   /// What waves add to blurred rays in the light of the lamp's middle.
-  [[nodiscard]] const std::vector<double>& diffraction(Deviations at) const;
+  /// @param for_tilts  as finely as tilts ask for, at three times the cost; always if there is one.
+  [[nodiscard]] const std::vector<double>& diffraction(Deviations at, bool for_tilts) const;
   /// Its change by one of deviation_steps() from the forecast.
   [[nodiscard]] const std::vector<double>& diffraction_change(Deviation deviation) const;
   /// The same to first order, from that of deviations close by.
@@ -185,7 +187,7 @@ class WallModel {
   using PictureKey = std::pair<Deviations, Deviations>;
   mutable Kept<PictureKey, std::vector<double>> lights_;
   mutable Kept<PictureKey, Image> pictures_;
-  mutable Kept<Deviations, std::vector<double>> diffractions_;
+  mutable Kept<std::pair<Deviations, bool>, std::vector<double>> diffractions_;
   mutable std::array<std::vector<double>, kDeviations> diffraction_changes_;  ///< Once asked for.
 };
 
