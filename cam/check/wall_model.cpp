@@ -343,6 +343,7 @@ void WallModel::choose_light() {
   waves_.emplace();
   waves_->wavelength = wavelength;
   waves_->scatter = order_angles(wavelength, passes_);
+  waves_->stray *= fine_;  // Of the lens's pixels.
   const OpticalSetup point = lit_from(wide_, Eigen::Vector2d::Zero());
   const std::shared_ptr<const Part> made = part(Deviations::Zero());
   const std::vector<double> rays = light_of(*made, point);

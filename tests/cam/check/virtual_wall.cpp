@@ -227,6 +227,7 @@ WallLight Workshop::lit_by(const std::vector<LampPoint>& points, double spread,
   std::vector<double> sum(static_cast<std::size_t>(wall.pixels.prod()), 0.0);
   WaveOptions waves;
   waves.scatter = order_angles(waves.wavelength, setup_.passes());
+  waves.stray *= kFine;
   // A tilt shows by less than what a picture shows of it.
   if (wall.screen_is_turned()) waves.stray = 0.002;
   const SurfaceField* const surface = &part;
