@@ -484,7 +484,7 @@ struct DistantStart {
   double value;
   double least = 0.0;  ///< CauseFit::systematic from which on it is tried.
 };
-/// Above what photographs have whose causes were found, and below what a fault leaves.
+/// Above what is left where nothing is wrong, 0.0004, and below what a wall 2 % off leaves.
 constexpr double kUnexplained = 0.001;
 /// Scallops that a weaker polish leaves show suddenly, so that nothing of them is in the
 /// derivatives around the forecast; where they show, those of a ball that is a sixth off have
